@@ -37,6 +37,18 @@ def test_degrees_are_projected(tmp_path):
     assert np.diff(reports.first).tolist() == [1, 0]
 
 
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_decimals_with_commas_are_read(tmp_path, separator):
+    """A spreadsheet's positions and levels were lost without a word."""
+    rows = ["lat lon AP1 AP2", "60,171 24,941 -70,5 100", "60.172 24,942 -71 -80,25"]
+    text = "".join(row.replace(" ", separator) + "\n" for row in rows)
+    reports = read(tmp_path, text)
+    points = read(tmp_path, text.replace(",", "."))
+    assert reports.level_dbm.tolist() == [-70.5, -71, -80.25]
+    np.testing.assert_array_equal(reports.places, points.places)
+    assert 385_000 < reports.east_m[0] < 387_000
+
+
 @pytest.mark.parametrize("header", ["x,y,lon,lat", "east_m,north_m,longitude,latitude"])
 def test_degrees_beside_metres_are_no_levels(tmp_path, header):
     """West of Greenwich a longitude could be a level in dBm."""

@@ -24,6 +24,7 @@ from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail, listed
 from mapfilter.geodesy import projected_crs, short_crs, utm_crs
 from mapfilter.positioning.fingerprints.reports import Reports, make_reports
+from mapfilter.tracks.table_files import DECIMAL_COMMA
 
 NOT_RECEIVED_DBM = 100.0
 """Stands for a transmitter that was not received."""
@@ -52,7 +53,7 @@ def read_fingerprint_table(path: Path | str, crs: str | None = None) -> Reports:
     Columns ``east_m, north_m`` (or ``x, y``) hold metres, ``lon, lat`` (or ``longitude, latitude``)
     degrees, or metres where they cannot be degrees; metres are used where a table has both. Columns
     such as ``floor`` and ``userid`` are not used; all others are transmitters. Levels that are none
-    are left out and counted.
+    are left out and counted. Decimals may have commas where commas do not separate fields.
 
     Parameters
     ----------
@@ -135,6 +136,10 @@ def _read(path: Path) -> tuple[pd.DataFrame, list[str]]:
     except (ValueError, pd.errors.ParserError, pd.errors.ParserWarning) as error:
         got = str(error).splitlines()[0]
         raise fail(InputError, str(path), expected, got, "cut off, or no text") from error
+    if separator != ",":
+        for name in table.columns[~table.dtypes.map(pd.api.types.is_numeric_dtype)]:
+            texts = table[name].astype(str)
+            table[name] = texts.str.replace(DECIMAL_COMMA, r"\1.\2", regex=True)
     return table, notes
 
 
