@@ -27,7 +27,7 @@ SEPARATORS = (",", ";", "\t")
 _LARGEST_BYTES = 2 << 30
 _BLOCK_BYTES = 1 << 22
 _MOST_COLUMNS = 1000
-DECIMAL_COMMA = r"^\s*([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)\s*$"
+_DECIMAL_COMMA = r"^\s*([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)\s*$"
 """A number that has a comma for a point."""
 
 
@@ -125,7 +125,7 @@ def _read_csv(table: str, path: Path) -> ReadTable:
         # Also of columns that are no part of a log, but read: degrees and their accuracy.
         texts = {column.name for column in SCHEMA[table] if column.kind == "text"}
         for name in rows.columns[~rows.columns.isin(texts)]:
-            rows[name] = rows[name].str.replace(DECIMAL_COMMA, r"\1.\2", regex=True)
+            rows[name] = rows[name].str.replace(_DECIMAL_COMMA, r"\1.\2", regex=True)
     notes = [f"{path}: {zeros}"] if zeros else []
     if cut:
         ends = data.count(b"\n") or data.count(b"\r")
