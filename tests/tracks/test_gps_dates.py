@@ -120,8 +120,10 @@ def test_times_of_day_are_no_seconds_of_a_week(tmp_path):
     place = "6010.2000,N,02456.1000,E,1,08,1.0,20.0,M,18.0,M,,"
     lines = [f"$GPGGA,{100_000 + k // 60 * 100 + k % 60},{place}" for k in range(COUNT)]
     (tmp_path / "fixes.nmea").write_text("\n".join(lines))
-    with pytest.raises(mf.MapfilterError, match="expected positions or speeds in common"):
-        mf.read_log([tmp_path / "fixes.nmea", cells(tmp_path / "cells.csv", sunday_s)])
+    digits = 100_000 + ELAPSED_S // 60 * 100 + ELAPSED_S % 60
+    for fixes in (tmp_path / "fixes.nmea", written(tmp_path / "fixes.csv", digits, **WAY)):
+        with pytest.raises(mf.MapfilterError, match="expected positions or speeds in common"):
+            mf.read_log([fixes, cells(tmp_path / "cells.csv", sunday_s)])
 
 
 @pytest.mark.parametrize(

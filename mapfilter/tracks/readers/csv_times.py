@@ -79,8 +79,9 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
             reading.note(f"time: seconds of the GPS week in column {week}")
             counted_s = utc_from_week_s(weeks_of(mapped.rows, week, reading), number)
             return over_stuck_weeks(reading, counted_s, week)
-        reading.clock = Clock("monotonic")
-        return over_days(reading, over_weeks(reading, _without_digits(reading, number)))
+        number = _without_digits(reading, number)
+        reading.clock = Clock("monotonic", from_midnight=_OF_DAY in reading.notes)
+        return over_days(reading, over_weeks(reading, number))
     reading.notes[:] = [
         note
         for note in reading.notes
