@@ -12,6 +12,7 @@ from mapfilter._words import number_of
 from mapfilter.gnss.almanacs import WEEK_S
 from mapfilter.gnss.atmosphere import directions, ionosphere_m, receiver_m, troposphere_m
 from mapfilter.gnss.broadcast import gps_from_utc_s, place_by_broadcast
+from mapfilter.tracks.position_units import continuous_deg
 from mapfilter.tracks.readers.recording import Recording
 from mapfilter.tracks.schema import LEAST_PLACE_M, MOST_PLACE_M, PLACE
 
@@ -85,7 +86,8 @@ def _receiver(recordings: Sequence[Recording]) -> tuple[float, float, float] | N
     for name in ("positions", "truth"):
         for recording in recordings:
             if name in recording.tables:
-                middle = recording.tables[name][["lat_deg", "lon_deg", "altitude_m"]].median()
+                places = recording.tables[name][["lat_deg", "lon_deg", "altitude_m"]]
+                middle = places.assign(lon_deg=continuous_deg(places["lon_deg"])).median()
                 altitude = middle["altitude_m"]
                 height_m = float(altitude) if np.isfinite(altitude) else 0.0
                 return float(middle["lat_deg"]), float(middle["lon_deg"]), height_m

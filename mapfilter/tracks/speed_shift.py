@@ -51,16 +51,14 @@ applied, see --offset (likely: GPS time for UTC)'
     # Of short recordings a shift to one side leaves too little in common.
     shifts, agreed = shifts[np.isfinite(agreed)], agreed[np.isfinite(agreed)]
     at = int(np.argmax(agreed))
+    if at in (0, len(shifts) - 1):
+        return ""
     shift_s, best = float(shifts[at]), float(agreed[at])
     # A speed that repeats itself, as between lights, agrees at several shifts.
     peak = np.r_[False, (agreed[1:-1] >= agreed[:-2]) & (agreed[1:-1] >= agreed[2:]), False]
     peak &= np.abs(shifts - shift_s) > _PEAK_S
     other_best = float(agreed[peak].max(initial=-1.0))
-    if (
-        not _is_clear(best, max(now, other_best))
-        or abs(shift_s) < _REMARKABLE_S
-        or at in (0, len(shifts) - 1)
-    ):
+    if not _is_clear(best, max(now, other_best)) or abs(shift_s) < _REMARKABLE_S:
         return ""
     low, high = _LEAP_S
     leap = " (likely: GPS time for UTC)" if low <= abs(shift_s) <= high else ""

@@ -6,6 +6,7 @@ import pytest
 
 import mapfilter as mf
 from mapfilter.errors import InputError
+from mapfilter.tracks.speed_shift import shift_note
 
 COUNT = 900
 TIME_S = 1_778_666_400.0 + np.arange(float(COUNT))
@@ -62,6 +63,13 @@ def test_so_is_one_where_positions_end_early(notes, shift_s, seed):
     (note,) = notes(shift_s, seed=seed, fixes_s=220)
     assert float(note.partition(" best ")[2].split()[0]) == pytest.approx(-shift_s, abs=1.0)
     assert notes(0.0, seed=seed, fixes_s=220) == []
+
+
+def test_recordings_of_three_minutes_have_one_shift_alone():
+    """Any other one leaves less in common than it takes."""
+    time_s = np.arange(181.0)
+    speeds = time_s, 10 + 5 * np.sin(time_s / 20) + 3 * np.sin(time_s / 7)
+    assert shift_note("fixes.csv", speeds, speeds) == ""
 
 
 @pytest.mark.parametrize("seed", range(5))

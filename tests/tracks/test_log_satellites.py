@@ -5,6 +5,8 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
+from made_recordings import START_UTC_S
+from made_satellites import rinex3_nav, rinex_obs
 
 from mapfilter.errors import InputError
 from mapfilter.gnss.almanacs import Almanac, nominal_gps
@@ -12,6 +14,7 @@ from mapfilter.gnss.broadcast import UNPLACED
 from mapfilter.gnss.orbits import EARTH_RATE_RAD_S, gps_time, satellite_positions_m
 from mapfilter.tracks.kinds import leave_out
 from mapfilter.tracks.log import make_log
+from mapfilter.tracks.open_log import open_log
 from mapfilter.tracks.satellites import place_satellites
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import read_log, write_log
@@ -213,3 +216,15 @@ def test_kinds_are_left_out_one_by_one():
         "pseudoranges: 3 left out",
     )
     assert leave_out(make_log(CRS, gnss=fix), ["tdoa", "ta", "radio"]).notes == ()
+
+
+def test_the_middle_of_a_journey_across_180_degrees_is_there(tmp_path):
+    """Clocks of constellations, and delays in the atmosphere, are judged from it."""
+    for name, text in (("ranges.obs", rinex_obs()), ("day.nav", rinex3_nav())):
+        (tmp_path / name).write_text(text)
+    table = pd.DataFrame({"time": START_UTC_S + np.arange(20.0), "lat": -17.5})
+    found = []
+    for lon in (179.99999, np.where(np.arange(20) < 10, 179.99999, -179.99999)):
+        table.assign(lon=lon).to_csv(tmp_path / "places.csv", index=False)
+        found.append(open_log(tmp_path).log.pseudoranges["pseudorange_m"])
+    np.testing.assert_allclose(*found, rtol=0, atol=1.0)

@@ -162,6 +162,17 @@ def test_where_one_cell_is_received_there_is_no_margin():
     assert "63" not in shown.partition("Best server")[2].partition(".")[0]
 
 
+def test_degrees_of_a_map_across_180_degrees():
+    bundle = made.database_bundle()
+    south, north = ([[lon, lat] for lon in (179.9, -179.9)] for lat in (-17.5, -17.4))
+    bundle["frame"] |= {"corners": [*south, *reversed(north)]}
+    task = """MF.start(bundle); const [width, height] = bundle.frame.size;
+    return [0.25, 0.75].map((u) => MF.page.ground.lonLat(u * width, height / 2));"""
+    west, east = ran(task, bundle=bundle)
+    assert (west["lon"], west["lat"]) == pytest.approx((179.95, -17.45))
+    assert (east["lon"], east["lat"]) == pytest.approx((-179.95, -17.45))
+
+
 def test_a_bound_that_is_the_same_everywhere_is_drawn():
     bundle = made.database_bundle()
     value = packed(np.full((made.ROWS, made.COLS), 25.0), "u2", scale=0.5, none=65_535)

@@ -77,9 +77,12 @@
       const { corners, size } = bundle.frame;
       if (!corners || !(size[0] > 0 && size[1] > 0)) return null;
       const [u, v] = [east / size[0], north / size[1]];
-      const mix = (k) => (1 - v) * ((1 - u) * corners[0][k] + u * corners[1][k])
-        + v * ((1 - u) * corners[3][k] + u * corners[2][k]);
-      return { lon: mix(0), lat: mix(1) };
+      // Longitudes go on across 180 degrees.
+      const near = (one, k) => (k ? one : one - 360 * Math.round((one - corners[0][0]) / 360));
+      const [sw, se, ne, nw] = corners.map((one) => one.map(near));
+      const mix = (k) => (1 - v) * ((1 - u) * sw[k] + u * se[k]) + v * ((1 - u) * nw[k] + u * ne[k]);
+      const lon = mix(0);
+      return { lon: lon - 360 * Math.round(lon / 360), lat: mix(1) };
     };
     ground.cellName = (cell) => ground.cells[cell]?.label || ground.cells[cell]?.id || "unknown cell";
     return ground;
