@@ -70,7 +70,8 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
     known = number[np.isfinite(number)]
     usual_s = abs(float(np.median(known))) if known.size else np.inf
     _check_digits(mapped, reading, known)
-    if known.size >= 0.5 * np.count_nonzero(~missing) and usual_s < LEAST_UNIX_S:
+    given = np.count_nonzero(mapped.rows.with_digits(*mapped.names("time")))
+    if known.size >= 0.5 * given and usual_s < LEAST_UNIX_S:
         if are_days(known) or (in_days(known) and _DAYS in reading.notes):
             reading.note(_DAYS)
             return _local(reading, np.round((number - _EPOCH_DAYS) * DAY_S, 3), options.zone)
@@ -209,7 +210,7 @@ def _note_gps(reading: Reading, name: str, known: Floats) -> None:
 def _over_midnight(mapped: Mapped, reading: Reading, time_s: Floats) -> Floats:
     """Return times that go on after midnight where a column of dates keeps the day of the start."""
     dates = mapped.rows.texts(DATE)
-    dates = dates[~mapped.rows.flags(DATE, true=MISSING)]
+    dates = dates[mapped.rows.with_digits(DATE)]
     if DATE not in mapped.beside or (dates[1:] != dates[:-1]).any():
         return time_s
     known_s = time_s[np.isfinite(time_s)]
