@@ -91,7 +91,7 @@ def bound(
     Raises
     ------
     InputError
-        The database is too large for the memory.
+        The database has no cells, or is too large for the memory.
     StoreError
         The path holds no database, or one that is damaged.
     ConfigError

@@ -241,7 +241,7 @@ def bound(
     Raises
     ------
     InputError
-        The database is too large for the memory.
+        The database has no cells, or is too large for the memory.
     """
     radio = radio_map(database)
     rng = np.random.default_rng(seed)

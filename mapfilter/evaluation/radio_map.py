@@ -137,8 +137,11 @@ def radio_map(database: RadioRouteDatabase) -> RadioMap:
     Raises
     ------
     InputError
-        Its lattice times its cells is beyond 1e9 levels.
+        It has no cells, or its lattice times its cells is beyond 1e9 levels.
     """
+    if not database.cell_ids:
+        hint = "a database of roads alone"
+        raise fail(InputError, str(database.path), "cells", "none", hint)
     lattice = database.lattice
     size = lattice.rows * lattice.cols * len(database.cell_ids)
     if size > MOST_LEVELS:

@@ -130,7 +130,10 @@ class GridBelief:
     @cached_property
     def _held(self) -> tuple[Any, Any]:
         """Pixels that hold mass, as states, and their weights, on the device."""
-        _, mass, state = self.moved.above(_LEAST_MASS)
+        moved = self.moved
+        # Until the next update each metre costs some of the mass.
+        total = float(moved.on.sum(dtype=np.float64) + moved.off.sum(dtype=np.float64))
+        _, mass, state = moved.above(_LEAST_MASS * total)
         return state, (mass / mass.sum()).astype(np.float32)
 
     def above(self, least: float, *, of_highest: bool = False) -> tuple[Any, Any, Any]:

@@ -157,7 +157,9 @@ class ParticleBelief:
         return summarise(self.state, self.weight, self.bins)
 
     def __getstate__(self) -> dict[str, object]:
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+        kept = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        # The summary before resampling does not follow from what is left.
+        return kept | {name: one for name, one in vars(self).items() if name == "summary"}
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,9 +3,10 @@
 Reports of a journey in one square of some tens of metres are one visit for each cell: their errors
 are the same. Its level is the median over the reports, in which a cell that is missing counts as
 weaker than what a report could hold: the weakest level in a full report, else the receiver's
-sensitivity. Where the median is such a bound, the cell was not received. A report of the serving
-cell alone says nothing of other cells, unless most reports of its journey have neighbours, and none
-says anything of a layer (:mod:`mapfilter.radio.layers`) of which the phone measures nothing.
+sensitivity. Where the median is such a bound, the cell was not received. A cell is not missing
+where a nameless neighbour may be it. A report of the serving cell alone says nothing of other
+cells, unless most reports of its journey have neighbours, and none says anything of a layer
+(:mod:`mapfilter.radio.layers`) of which the phone measures nothing.
 """
 
 from __future__ import annotations
@@ -176,6 +177,8 @@ class _Resolver:
         }
         self.band = {plan.index(name): i for i, name in enumerate(field.cell_ids)}
         self.layer = layer_numbers(plan.cells)
+        codes = [(cell.arfcn, cell.bsic) for cell in plan.cells]
+        self.codes = np.array(codes, dtype=np.float64).reshape(-1, 2)
 
     def cell(self, row: ReportRow, serving: int, east_m: float, north_m: float) -> int:
         if row.cell is not None:
@@ -197,6 +200,23 @@ class _Resolver:
         order = np.argsort(-ranked)
         clear = ranked[order[0]] - ranked[order[1]] >= _APART_DB
         return known[int(order[0])] if clear else -1
+
+    def may_be(self, row: ReportRow) -> Sequence[int] | Ints:
+        """Return the cells that a row is of, may be of, or that are not reported beside it.
+
+        Of one carrier and BSIC the phone reports the strongest cell only. A neighbour that the
+        plan's carriers and codes do not tell may be a cell without them.
+        """
+        known: list[int] = []
+        if row.cell is not None and row.cell in self.plan:
+            known.append(self.plan.index(row.cell))
+        if row.arfcn is not None and row.bsic is not None:
+            known += self.carriers.get((row.arfcn, row.bsic), ())
+        if known or row.cell is not None:
+            return known
+        code = np.array([row.arfcn, row.bsic], dtype=np.float64)
+        fits = np.isnan(self.codes) | np.isnan(code) | (self.codes == code)
+        return np.flatnonzero(fits.all(axis=1))
 
 
 def _is_level(row: ReportRow) -> bool:
@@ -263,10 +283,9 @@ def _report(
             counts[layer] = counts.get(layer, 0) + 1
         if cell >= 0 and np.isnan(level[cell]):
             level[cell] = row.level_dbm
-        if row.arfcn is not None and row.bsic is not None:
-            # The phone reports the strongest cell of a carrier and BSIC only.
-            hidden = [c for c in resolver.carriers.get((row.arfcn, row.bsic), ()) if c != cell]
-            bound[hidden] = np.nan
+    for row in epoch.radio:
+        if row.censored >= 0:
+            bound[resolver.may_be(row)] = np.nan
     if resolver.layer.any():
         # Of other layers than the serving cell's a phone measures few cells, or none.
         measured = {layer for layer, count in counts.items() if count >= _ROWS_OF_A_LAYER}

@@ -81,7 +81,9 @@ def success_curves(
     Cells of one curve differ in that coordinate alone; filters name the curves, and the other
     coordinates in which cells of one filter differ.
     """
-    axes = [one for one in axes_of(cells, by_reading=True) if over not in (one, one.split(".")[-1])]
+    axes = axes_of(cells, by_reading=True)
+    # An option of dead reckoning that is varied stands for its own column, none of a filter does.
+    axes = [one for one in axes if over not in (one, one.partition(".")[2])]
     curves: dict[str, list[SuccessCell]] = {}
     for cell in cells:
         name = ", ".join([cell.reading, *place_words(cell.place, axes)])

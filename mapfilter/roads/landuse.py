@@ -259,6 +259,8 @@ def _check_raster(source: Any, path: Path, lattice: Lattice, colour: bool) -> No
         faults.add(f"{path}, pixels", "whole numbers", source.dtypes[0], "a continuous quantity")
     elif colour and set(source.dtypes) != {"uint8"}:
         faults.add(f"{path}, pixels", "colours of 8 bits", source.dtypes[0])
-    if source.transform.b or source.transform.d or source.transform.e >= 0:
-        faults.add(f"{path}, pixels", "rows from north to south", "rotated or upside-down ones")
+    transform = source.transform
+    if transform.b or transform.d or transform.e >= 0 or transform.a <= 0:
+        got = "rotated, upside-down or mirrored ones"
+        faults.add(f"{path}, pixels", "rows from north to south", got)
     faults.raise_if_any(InputError)

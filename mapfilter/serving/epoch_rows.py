@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from math import isfinite, nan
 from typing import Any
 
+import pandas as pd
+
 from mapfilter._inputs import shown
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import wrap_rad
@@ -13,6 +15,7 @@ from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.merging import epoch_columns, make_epoch
 from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.radio.identities import IDENTITY, LIMITS, TIMING_STEP_M
+from mapfilter.radio.identities import technology as technology_of
 from mapfilter.radio.plan_names import PlanNames, ReportedCell
 from mapfilter.serving.documents import (
     RequestError,
@@ -25,6 +28,7 @@ from mapfilter.serving.documents import (
 )
 from mapfilter.serving.places import in_metres
 from mapfilter.tracks.neighbour_codes import CODED, CodedRow, neighbours_by_code
+from mapfilter.tracks.repeated_readings import repeated_readings
 from mapfilter.tracks.schema import (
     LEAST_PLACE_M,
     MISSING_SIGNS,
@@ -153,24 +157,35 @@ def _rows(
             name: _value(column, row.get(name), f"{place}.{name}", faults)
             for name, column in _COLUMNS[table].items()
         }
+        if table == "radio" and values["technology"]:
+            # 4G is LTE, as in a log.
+            values["technology"] = technology_of(values["technology"]) or values["technology"]
         _CHECKS.get(table, _nothing)(values, place, faults)
         if table == "radio" and technology:
             _check_steps(values, technology, place, faults)
         if len(faults.found) > before:
             continue
-        if table == "radio":
-            values["cell"] = names.name(_reported(values))
         if table == "motion" and isfinite(values["heading_rad"]):
             values["heading_rad"] = float(wrap_rad(values["heading_rad"]))
         found.append(values)
+    found = _each_once(found)
     if table == "radio":
+        for values in found:
+            values["cell"] = names.name(_reported(values))
         rows = [CodedRow(0.0, *(values[name] for name in CODED)) for values in found]
         told = neighbours_by_code(rows, names.plan)
         for values, (carrier, cell) in zip(found, told, strict=True):
             values.update(arfcn=carrier, cell=cell)
-    # Rows that repeat another one exactly count once, as in a log.
-    columns = epoch_columns(table)
-    return list(dict.fromkeys(tuple(values[name] for name in columns) for values in found))
+    return [tuple(values[name] for name in epoch_columns(table)) for values in found]
+
+
+def _each_once(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return rows without those that repeat another one exactly, as a log has them."""
+    if len({tuple(values.values()) for values in rows}) == len(rows):
+        return rows
+    table = pd.DataFrame(rows).assign(time_s=0.0)
+    repeated = repeated_readings(table, table.duplicated().to_numpy())
+    return [values for values, again in zip(rows, repeated.tolist(), strict=True) if not again]
 
 
 def _value(column: Column, value: object, where: str, faults: Faults) -> Any:

@@ -53,7 +53,7 @@ from mapfilter.positioning.sensors.undirected import UndirectedWay
 from mapfilter.positioning.sensors.watch import SensorWatch
 from mapfilter.positioning.step_output import Fix, StepOutput, UnusedReading
 
-FORMAT, VERSION = "mapfilter session", 18
+FORMAT, VERSION = "mapfilter session", 19
 
 _LARGEST_BYTES = 256 << 20
 _LARGEST_LINE = 1000
@@ -105,6 +105,9 @@ _CLASSES: dict[str, type] = {
         WanderFix,
     )
 }
+_BESIDES = {ParticleBelief.__name__: ("summary",)}
+"""What objects may hold that does not follow from their fields: a summary is that before
+resampling."""
 _ENUMS: dict[str, type[Enum]] = {one.__name__: one for one in (Reason, Status)}
 
 
@@ -217,10 +220,14 @@ class _Writer:
         name = type(value).__name__
         if _CLASSES.get(name) is type(value):
             names = _field_names(type(value))
-            return {
+            found = {
                 "class": name,
                 "fields": {key: self.value(getattr(value, key)) for key in names},
             }
+            besides = [key for key in _BESIDES.get(name, ()) if key in vars(value)]
+            if besides:
+                found["besides"] = {key: self.value(getattr(value, key)) for key in besides}
+            return found
         if type(value) is tuple:
             return {"tuple": [self.value(one) for one in value]}
         raise TypeError(f"a session cannot hold {type(value).__module__}.{name}")
@@ -267,7 +274,11 @@ class _Reader:
         kind = _CLASSES[given["class"]]
         if set(given["fields"]) != set(_field_names(kind)):
             raise KeyError(f"fields of {given['class']}")
-        return kind(**{key: self.value(one) for key, one in given["fields"].items()})
+        made = kind(**{key: self.value(one) for key, one in given["fields"].items()})
+        for key in _BESIDES.get(given["class"], ()):
+            if key in given.get("besides", {}):
+                vars(made)[key] = self.value(given["besides"][key])
+        return made
 
     def _array(self, place: Mapping[str, Any]) -> np.ndarray[Any, Any]:
         if place["dtype"] not in _DTYPES:

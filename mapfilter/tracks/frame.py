@@ -8,9 +8,10 @@ import numpy as np
 import pandas as pd
 from pyproj import Transformer
 
+from mapfilter._crs_reach import project_within
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import grid_convergence_rad, project, projected_crs, utm_crs
+from mapfilter.geodesy import grid_convergence_rad, project, projected_crs, unproject, utm_crs
 from mapfilter.tracks.position_units import continuous_deg, near_deg
 from mapfilter.tracks.readers.recording import Recording
 
@@ -60,6 +61,8 @@ class Frame:
         else:
             self.crs = projected_crs(_LOCAL.format(lat=0, lon=0))
             self.notes.append("no positions: the CRS of the log is a local frame")
+        if (crs or stated) and not np.isfinite(self.lat_deg):
+            self.lat_deg, self.lon_deg = self._middle_deg(recordings)
         if own and places and origin_deg is None and not crs:
             names = ", ".join(r.path.name for r in own)
             expected = "one frame of positions"
@@ -72,6 +75,23 @@ class Frame:
         if not np.isfinite(self.lat_deg):
             return 0.0
         return grid_convergence_rad(self.crs, self.lon_deg, self.lat_deg)
+
+    def _middle_deg(self, recordings: Sequence[Recording]) -> tuple[float, float]:
+        """Return latitude and longitude of the middle of places in metres.
+
+        NaN without any, or where the CRS of the log has no such place.
+        """
+        tables = [
+            self.east_north(r.tables[name], r.crs)
+            for r in recordings
+            for name in ("places", "true_places")
+            if name in r.tables
+        ]
+        if tables:
+            lon, lat = unproject(self.crs, *np.median(np.concatenate(tables, axis=1), axis=1))
+            if not project_within(self.crs, lon, lat)[2].any():
+                return float(lat), float(lon)
+        return float("nan"), float("nan")
 
     def east_north(self, rows: pd.DataFrame, crs: str) -> tuple[Floats, Floats]:
         """Return positions of a table in the log's CRS; ``crs`` is that of its metres."""

@@ -116,6 +116,8 @@ def week_start_s(recording: Recording, other: Recording) -> float | None:
     other : Recording
         In UTC, with which most of the shorter one has to overlap.
     """
+    if recording.clock.from_midnight:
+        return None
     begin_s, end_s = span_s(recording)
     there = span_s(other)
     if begin_s < _LEAST_TOW_S or begin_s >= WEEK_S or there[0] < GPS_EPOCH_S:

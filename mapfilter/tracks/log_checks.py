@@ -127,7 +127,8 @@ def truth_far_off(crs: str, tables: Mapping[str, pd.DataFrame]) -> tuple[str, ..
     if not off_m > FAR_M:
         return ()
     low, high = (truth[["east_m", "north_m"]].agg(of) for of in ("min", "max"))
-    bounds_m = (*low.tolist(), *high.tolist())
+    # A truth at rest has an extent, too.
+    bounds_m = (*(low - _AREA_M).tolist(), *(high + _AREA_M).tolist())
     area = Lattice.covering(crs, bounds_m, _AREA_M)
     mistake = misplaced_by(east_m, north_m, area)
     likely = (

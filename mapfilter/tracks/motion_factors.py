@@ -60,6 +60,9 @@ def scaled_motion(
         elif factor != 1:
             values = factor * motion[column].to_numpy(dtype=np.float64)
             changed[column] = wrap_rad(values) if column == "heading_rad" else values
+            if column == "step_m" and "sampling_sd_m" in motion:
+                # The error of a step is in its unit.
+                changed["sampling_sd_m"] = abs(factor) * motion["sampling_sd_m"].to_numpy()
             notes.append(f"motion, {column}: times {factor:g}, as given")
     faults.raise_if_any(InputError)
     return (motion if motion is None else motion.assign(**changed)), tuple(notes)

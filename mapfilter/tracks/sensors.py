@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Literal
 
@@ -56,6 +57,25 @@ counter-clockwise from grid east; ``reckoning`` belongs to motion made of these 
 _LONGEST_HEADER_BYTES = 1 << 16
 Form = Literal["parquet", "csv"]
 """Of the tables of a log."""
+
+
+def check_sensors(sensors: Mapping[str, pd.DataFrame]) -> None:
+    """Raise InputError where tables are of no sensor of a log, lack a column, or hold text."""
+    faults = Faults()
+    for name, rows in sensors.items():
+        if name not in SENSOR_COLUMNS:
+            near = get_close_matches(name, SENSOR_COLUMNS, 1)
+            faults.add("sensors", f"one of {', '.join(SENSOR_COLUMNS)}", repr(name), *near)
+            continue
+        columns = SENSOR_COLUMNS[name] if len(rows) else ()
+        if lacking := [column for column in columns if column not in rows]:
+            faults.add(f"sensors, {name}", f"columns {', '.join(columns)}", f"no {lacking[0]}")
+        for column in (column for column in columns if column in rows):
+            try:
+                rows[column].astype("float64")
+            except (TypeError, ValueError):
+                faults.add(f"sensors, {name}, {column}", "numbers", "others among them")
+    faults.raise_if_any(InputError)
 
 
 def write_sensors(

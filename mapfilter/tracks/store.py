@@ -33,7 +33,13 @@ from mapfilter.gnss.almanacs import read_yuma
 from mapfilter.tracks.imu_noise import parse_imu_noise
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.schema import OPTIONAL, SCHEMA, TABLES
-from mapfilter.tracks.sensors import FOLDER, SENSOR_COLUMNS, Form, write_sensors
+from mapfilter.tracks.sensors import (
+    FOLDER,
+    SENSOR_COLUMNS,
+    Form,
+    check_sensors,
+    write_sensors,
+)
 from mapfilter.tracks.table_files import read_table
 
 HEAD = "log.json"
@@ -133,6 +139,8 @@ def write_log(
         The folder cannot be written, or holds files that no log of mapfilter lists.
     ConfigError
         There is no log, or no path, or another argument is of another type.
+    InputError
+        A table of ``sensors`` is none of a log, or lacks a column.
     """
     check_arguments(
         "write_log",
@@ -143,6 +151,7 @@ def write_log(
             Entries("sensors", sensors, pd.DataFrame, "a table", "the table of each sensor"),
         ],
     )
+    check_sensors(sensors or {})
     folder = Path(folder)
     check_log_replaceable(folder)
     with atomic_dir(folder) as new:

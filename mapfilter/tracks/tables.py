@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools
 from mapfilter._words import number_of
-from mapfilter.errors import Faults
+from mapfilter.errors import Faults, listed
 from mapfilter.geodesy import wrap_rad
-from mapfilter.radio.identities import LIMITS
+from mapfilter.radio.identities import LIMITS, technology
 from mapfilter.tracks.column_values import TableFaults, column_values, note_values
 from mapfilter.tracks.cut_times import cut_times
 from mapfilter.tracks.repeated_readings import repeated_readings
@@ -34,6 +34,7 @@ _SOMEWHERE_M = 25.0
 _SLOW_MPS = 0.04
 _ROWS_AT_ONCE = 100_000
 _MOVING = ("motion", "gnss", "truth")
+_SHOWN = 40
 
 
 def tidy_table(
@@ -69,7 +70,9 @@ def tidy_table(
         role = tidy["role"]
         bad = role.notna().to_numpy() & ~role.isin([SERVING, NEIGHBOUR]).to_numpy()
         note_values(found, bad, SCHEMA["radio"][1], role)
-        _check_technologies(tidy, found)
+        if "technology" in tidy:
+            tidy["technology"] = _technologies(tidy["technology"], found)
+            _check_technologies(tidy, found)
         tidy["censored"] = tidy["censored"].fillna(0)
     if table == "gnss":
         _check_covariance(tidy, found)
@@ -109,13 +112,20 @@ def _check_columns(table: str, given: pd.DataFrame, found: TableFaults) -> tuple
     return tuple(notes)
 
 
+def _technologies(stated: pd.Series, found: TableFaults) -> pd.Series:
+    """Return technologies by their usual names, as LTE for 4G; note words that are none."""
+    names = {word: technology(word) for word in stated.dropna().unique()}
+    if unknown := [word for word, name in names.items() if name is None]:
+        some = listed([repr(word[:_SHOWN]) for word in unknown])
+        found.notes.append(f"{found.where}, technology: {some} not known, taken for none")
+    others = {word: name for word, name in names.items() if name not in (None, word)}
+    return stated.replace(others) if others else stated
+
+
 def _check_technologies(radio: pd.DataFrame, found: TableFaults) -> None:
     """Note carriers, codes and timing advances that the row's technology does not have."""
-    if "technology" not in radio:
-        return
-    technology = radio["technology"]
     for family, limits in LIMITS.items():
-        of = (technology == family).to_numpy()
+        of = (radio["technology"] == family).to_numpy()
         for name, most in limits.items():
             if of.any() and name in radio:
                 value = radio[name].to_numpy(dtype=np.float64, na_value=np.nan)

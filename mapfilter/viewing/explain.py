@@ -132,8 +132,12 @@ def explain(
     else:
         everywhere = [np.ones(other.belief.log_weight.size, dtype=np.bool_)]
         previous = before.alternative.belief if before.alternative is not None else other.belief
-        against = weighed_by(other.belief, updates, measured=measured, alternative=True)
-        terms = list(_prefixes(against, updates, names, alternative=True))
+        terms = []
+        if reading is not None:
+            # As the step weighs: the alternative with the belief, also where it has no evidence.
+            against = weighed_by(other.belief, updates, measured=measured, alternative=True)
+            against = against or RadioReading()
+            terms = list(_prefixes(against, updates, names, alternative=True))
         chain, withheld_beside = _chain(model, other.belief, terms, everywhere)
         beside = [*_streets(previous, other.belief, everywhere), *chain]
     heads = [("streets", -1, nan), *((one.what, one.cell, one.measured_dbm) for one in main)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -26,8 +27,8 @@ ROLES = ("serving", "neighbour")
 LevelAt = Callable[[Floats, Floats, Sequence[str | None]], Floats]
 """Predicted levels of cells at places of the CRS, NaN where there are none."""
 
-Unused = Mapping[tuple[float, str, str], Reason]
-"""Reasons by time, role and name of a reading."""
+Unused = Mapping[tuple[float, str, str], tuple[Reason, int]]
+"""Reasons, and of how many readings, by time, role and name of these."""
 
 _LATE = (Reason.NOT_MOVED_ENOUGH, Reason.STALE_RADIO)
 
@@ -59,7 +60,11 @@ class ReadingRow(NamedTuple):
 def unused_of(readings: Iterable[UnusedReading]) -> tuple[Unused, frozenset[str]]:
     """Return why readings were not used, and the kinds that a filter never uses."""
     some = list(readings)
-    why = {(one.time_s, one.kind, one.what): one.reason for one in some}
+    why: dict[tuple[float, str, str], tuple[Reason, int]] = {}
+    for one in some:
+        key = one.time_s, one.kind, one.what
+        _, before = why.get(key, (one.reason, 0))
+        why[key] = one.reason, before + 1
     never = frozenset(one.kind for one in some if one.reason is Reason.NOT_USED_BY_FILTER)
     return why, never
 
@@ -85,11 +90,15 @@ def report_rows(
     why, never = unused
     found: list[ReadingRow] = []
     serving = -1
+    left = Counter((row.role, row.name) for row in epoch.radio)
     for row in epoch.radio:
-        name = _named(row.cell, row.arfcn, row.bsic)
+        name = row.name
         known = _cell_of(row, plan, plan.ids[serving] if serving >= 0 else None)
         cell = index.get(known, -1) if known is not None else -1
-        use = why.get((epoch.time_s, row.role, name), Reason.USED)
+        use, times = why.get((epoch.time_s, row.role, name), (Reason.USED, 0))
+        # Of rows of one name those that are not used are the last ones.
+        use = use if left[row.role, name] <= times else Reason.USED
+        left[row.role, name] -= 1
         if row.role in never:
             use = Reason.NOT_USED_BY_FILTER
         elif use is Reason.USED and reason in _LATE:
@@ -176,11 +185,3 @@ def _cell_of(row: ReportRow, plan: CellPlan, serving: str | None) -> str | None:
     alike = plan.ids_by_carrier.get((row.arfcn, -1 if row.bsic is None else row.bsic), ())
     others = [cell for cell in alike if cell != serving]
     return others[0] if len(others) == 1 else None
-
-
-def _named(cell: str | None, arfcn: int | None, bsic: int | None) -> str:
-    """Return a cell as the reasons of a filter name it."""
-    if cell is not None:
-        return cell
-    code = "unknown" if bsic is None else bsic
-    return "" if arfcn is None else f"ARFCN {arfcn}, BSIC {code}"

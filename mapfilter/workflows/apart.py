@@ -7,7 +7,9 @@ from pathlib import Path
 
 from mapfilter.config.fields import Section
 from mapfilter.config.sections import Config
+from mapfilter.database.checked import MANIFEST
 from mapfilter.errors import ConfigError, Faults, OutputError
+from mapfilter.tracks.store import is_log
 
 _ALSO_WRITTEN = (
     "output.dir",
@@ -19,6 +21,9 @@ _ALSO_WRITTEN = (
 )
 """Keys of what one command writes and another one reads; these have checks of their own."""
 
+_MEASURED = ("prediction.survey.files", "roads.tracks.files")
+"""Keys of folders of which all files are read."""
+
 
 def input_paths(config: Config) -> dict[str, tuple[Path, ...]]:
     """Return the files and folders that a configuration names as inputs, by their keys."""
@@ -29,28 +34,40 @@ def input_paths(config: Config) -> dict[str, tuple[Path, ...]]:
 
 
 def check_no_input_replaced(config: Config, *outputs: Path) -> None:
-    """Raise OutputError, with every fault, where an output would replace an input."""
-    faults = Faults()
+    """Raise OutputError, with every fault, where an output would replace an input.
+
+    Among measurements of a folder it would be read as one of them.
+    """
+    faults, hint = Faults(), "give results a folder of their own, by --out"
     inputs = {path.resolve(): key for key, paths in input_paths(config).items() for path in paths}
     for path in outputs:
-        key = inputs.get(path.resolve())
-        if key is not None:
-            hint = "give results a folder of their own, by --out"
+        place = path.resolve()
+        if (key := inputs.get(place)) is not None:
             faults.add(str(path), "another place than an input", f"the file of {key}", hint)
+        elif (key := inputs.get(place.parent)) in _MEASURED:
+            faults.add(str(path), "another place than an input", f"the folder of {key}", hint)
     faults.raise_if_any(OutputError)
 
 
 def check_out_apart(out: Path, inputs: Sequence[Path], option: str = "--out") -> None:
-    """Raise ConfigError where results would lie in a database, a log, or another input folder.
+    """Raise ConfigError where results would lie in a database, a log, or among recordings.
 
-    ``option`` names them in the message.
+    They would be read as recordings, too; a folder of their own may lie beside these. ``option``
+    names the results in the message.
     """
     faults, place = Faults(), out.resolve()
     for path in dict.fromkeys(inputs):
-        if path.is_dir() and place.is_relative_to(path.resolve()):
+        if path.is_dir() and _is_in(place, path.resolve()):
             hint = "results need a folder of their own"
             faults.add(option, f"a folder outside {path}, which is an input", str(out), hint)
     faults.raise_if_any(ConfigError)
+
+
+def _is_in(place: Path, folder: Path) -> bool:
+    """Return whether a place lies in a database or log, or is a folder of recordings."""
+    if is_log(folder) or (folder / MANIFEST).is_file():
+        return place.is_relative_to(folder)
+    return place == folder and not any(map(is_log, folder.iterdir()))
 
 
 def _paths(section: Section, prefix: str) -> Iterator[tuple[str, tuple[Path, ...]]]:

@@ -17,7 +17,6 @@ from mapfilter._partial import nothing_left
 from mapfilter._types import Floats
 from mapfilter.database.export import write_layers
 from mapfilter.database.store import open_database
-from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.first_fix import FirstFixOptions
 from mapfilter.evaluation.map_bound import TWIN_ERROR, MapBound, bound, on_lattice, write_bound
 from mapfilter.evaluation.radio_map import ErrorModel
@@ -26,6 +25,7 @@ from mapfilter.radio.layers import layer_numbers
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.coverage import plot_point_values, plot_twins
 from mapfilter.report.saving import save
+from mapfilter.workflows.apart import check_out_apart
 
 NOTES = (
     "exact for the error model: the bound from given gradients; bits by the serving cell",
@@ -98,9 +98,8 @@ def run_bound(
 ) -> BoundResult:
     """Compute bounds on positioning by a database; write a raster, tables by way and of twins."""
     began_s = time.perf_counter()
+    check_out_apart(out, [path])
     database = open_database(path)
-    if not database.cell_ids:
-        raise fail(InputError, str(path), "cells", "none", "a database of roads alone")
     with nothing_left(out):
         ensure_writable_folder(out)
         found = bound(database, errors=errors, options=options, seed=seed, progress=progress)

@@ -18,7 +18,6 @@ from mapfilter.errors import ConfigError, fail
 from mapfilter.learning.apply import apply_patch
 from mapfilter.learning.patch import read_patch, write_patch
 from mapfilter.learning.phone import PhoneNoise
-from mapfilter.tracks.store import is_log
 from mapfilter.workflows.apart import check_out_apart
 from mapfilter.workflows.learn_report import PATCH, older_report, write_report
 from mapfilter.workflows.learn_study import study_logs
@@ -135,7 +134,8 @@ def run_learn(
     """
     began_s = time.perf_counter()
     _check_apart(config.database_path, out)
-    check_out_apart(out, [config.database_path, *filter(is_log, journeys_of(config))])
+    recorded = *journeys_of(config), *config.track.recordings
+    check_out_apart(out, [config.database_path, *recorded])
     report = out.with_name(f"{out.name}-report") if accept else out
     with nothing_left(report):
         ensure_writable_folder(report)

@@ -34,6 +34,7 @@ from mapfilter.report.saving import save
 from mapfilter.tracks.misplaced import check_near
 from mapfilter.tracks.open_options import OpenOptions
 from mapfilter.tracks.placeless import is_local_frame
+from mapfilter.workflows.apart import check_out_apart
 from mapfilter.workflows.fingerprints import WITHOUT_STEPS, read_database, read_reports
 from mapfilter.workflows.result_text import to_jsonable
 from mapfilter.workflows.results import (
@@ -124,6 +125,7 @@ def run_locate(
         where it holds the figures of another command.
     """
     began_s = time.perf_counter()
+    check_out_apart(out, [database, log])
     check_figures_of_reports(out)
     combine = replace(WITHOUT_STEPS.combine, truth=tuple(truth))
     options = replace(WITHOUT_STEPS, zone=zone, columns=columns or {}, combine=combine)
@@ -195,7 +197,8 @@ def _check_near(log: Path, reports: Reports, known: Reports, faults: Faults) -> 
 
 
 def _extent(values: Floats) -> tuple[float, float]:
-    return float(values.min()), float(values.max())
+    # Those of one place have an extent, too.
+    return float(values.min()) - _AREA_M, float(values.max()) + _AREA_M
 
 
 def _centroid_errors_m(fitted: ReportLocator, reports: Reports) -> Floats:

@@ -42,7 +42,6 @@ from mapfilter.tracks.kinds import leave_out
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.range_units import with_range_notes
-from mapfilter.tracks.store import is_log
 from mapfilter.workflows.apart import check_out_apart
 from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.kernels import compiled_beside
@@ -135,10 +134,10 @@ def run_replay(
         return cast(KalmanFilter, fitted).over_sites(plan, plan_antennas(config, plan))
 
     own = [database.path] if database is not None else []
-    check_out_apart(out, [*own, *(path for path in journeys.paths if is_log(path))])
     # Several logs are folders of these names.
     several = journeys.paths if len(journeys.paths) > 1 else []
     for folder in (out, *(out / path.name for path in several)):
+        check_out_apart(folder, [*own, *journeys.paths, *config.track.recordings])
         check_figures_of_replay(folder)
     has_sites = database is not None or config.cells.plan is not None
     if not has_sites:

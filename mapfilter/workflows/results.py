@@ -43,10 +43,15 @@ def check_figures_of_replay(out: Path) -> None:
 
 
 def check_figures_of_reports(out: Path) -> None:
-    """Raise OutputError where a folder holds figures that ``locate`` did not write.
+    """Raise OutputError where a folder holds figures or positions that ``locate`` did not write.
 
-    Damaged ones beside its other files are taken for its own.
+    Damaged figures beside its other files are taken for its own, positions without any are not.
     """
+    positions = out / POSITIONS
+    if positions.exists() and not (out / FIGURES).exists():
+        hint = "a recording, or a table; give another folder by --out"
+        expected = "positions of mapfilter locate, or nothing yet"
+        raise fail(OutputError, str(positions), expected, f"others, without {FIGURES}", hint)
     _check_figures(out, is_of_reports, "mapfilter locate", (POSITIONS,))
 
 

@@ -131,6 +131,8 @@ def run_survey(config: Config, progress: Progress | None = None) -> SurveyResult
         plan=plan_path,
         validation=validation,
         notes=(
+            *(inputs.predicted.notes if inputs.predicted is not None else ()),
+            *(plan.notes if plan is not None else ()),
             *measurements.notes,
             *survey.notes,
             *plan_faults(survey, plan, predicted),

@@ -14,6 +14,7 @@ from mapfilter.geodesy import projected_crs
 from mapfilter.lattice import Lattice, outside_m
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.far_cells import check_cells_near
+from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.survey.floor_values import without_floor_values
 from mapfilter.survey.measurements import Measurements, named_after
@@ -61,6 +62,7 @@ def survey_inputs(config: Config) -> SurveyInputs:
     if plan is not None and config.cells.layout != "opencellid":
         check_cells_near(plan, lattice, str(config.cells.plan))
     if predicted is not None and plan is not None:
+        predicted = named_by_plan(predicted, plan)
         check_eirp_stated(config, predicted, plan)
     return SurveyInputs(measurements, plan, lattice, predicted)
 

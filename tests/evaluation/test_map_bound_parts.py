@@ -8,7 +8,7 @@ import pytest
 import rasterio
 from radio_maps import FLOOR_DBM, made_map
 
-from mapfilter.errors import ConfigError
+from mapfilter.errors import ConfigError, InputError
 from mapfilter.evaluation.first_fix import FirstFix, FirstFixOptions, first_fix, starts
 from mapfilter.evaluation.map_bound import BANDS, MapBound, on_lattice, write_bound
 from mapfilter.evaluation.radio_map import ErrorModel, radio_map, received_cells
@@ -36,6 +36,11 @@ def fake_database():
         lattice=Lattice("EPSG:32631", 500_000.0, 10.0, 5.0, 2, 4), cell_ids=("A", "B"),
         field=lambda: field, plan=plan, floor_dbm=FLOOR_DBM, margin_db=6.0, path="db",
     )  # fmt: skip
+
+
+def test_a_database_of_roads_alone_has_no_bound():
+    with pytest.raises(InputError, match=r"db: expected cells, found none.*roads alone"):
+        radio_map(SimpleNamespace(cell_ids=(), path="db"))
 
 
 def test_a_database_in_memory():

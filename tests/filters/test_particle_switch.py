@@ -261,5 +261,7 @@ def test_copies_of_what_particles_keep_are_made_when_they_are_read():
     for belief in (after, moved, stored, replace(moved, travelled_m=9.0)):
         np.testing.assert_array_equal(belief.kept, copies.made())
         assert belief.kept is belief.kept_unread
+    # The summary before resampling is not that of the copies.
+    assert repr(stored.summary) == repr(after.summary) != repr(replace(after).summary)
     with pytest.raises(TypeError, match="kept"):
         ParticleBelief(after.state, after.log_weight, after.bins)

@@ -156,6 +156,30 @@ def test_cells_without_identity_or_of_other_networks_are_passed_over():
     assert heard == {(0, "A")}
 
 
+@pytest.mark.parametrize(
+    ("row", "missing"),
+    [
+        (neighbour(2, -85.0), "CDE"),
+        (ReportRow("neighbour", None, None, None, -85.0, 0), ""),
+        (ReportRow("neighbour", None, None, 0, -85.0, 0), ""),
+        (ReportRow("neighbour", None, 2, None, -85.0, 0), "CD"),
+        (ReportRow("neighbour", None, 2, 7, -85.0, 0), "BCD"),
+        (neighbour(99, -85.0), "BCD"),
+        (neighbour(99, -85.0, censored=-1), "BCDE"),
+        (ReportRow("neighbour", "B", None, None, np.nan, 0), "CDE"),
+        (ReportRow("neighbour", "Z", None, None, -85.0, 0), "BCDE"),
+    ],
+)
+def test_a_cell_that_a_neighbour_may_be_is_not_missing(row, missing):
+    """E has neither carrier nor code in the plan: as a neighbour it is one that no cell fits."""
+    plan = CellPlan(CRS, (*PLAN.cells, replace(PLAN.cells[0], id="E", arfcn=None, bsic=None)))
+    grid = np.full((20, 20, 5), -80.0, np.float32)
+    wider = replace(field(), cell_ids=plan.ids, level_dbm=grid)
+    report = (serving("A", -60.0), neighbour(1, -90.0), row)
+    found = visits_of([journey(report)], plan, wider)
+    assert "".join(plan.ids[c] for c in found.cell[~found.received]) == missing
+
+
 def test_serving_cells_that_the_plan_lacks_are_listed_by_their_number():
     reports = [(serving("X", -70.0),)] * 3 + [(serving("Y", -70.0),), (serving("A", -70.0),)]
     found = unlisted_cells([journey(*reports), journey((serving("X", -60.0),))], PLAN)

@@ -17,6 +17,7 @@ from mapfilter.positioning.bayes.alternative import AlternativeHypothesis
 from mapfilter.positioning.bayes.area_frame import BELOW_FLOOR_DB
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.filter import Hypotheses
 from mapfilter.positioning.loop import locate
 from mapfilter.positioning.merging import epochs
@@ -116,6 +117,35 @@ def test_contributions_to_the_alternative_add_up_to_its_evidence(town_filter, st
         assert total + waiting == pytest.approx(gained, abs=2e-6)
         compared += 1
     assert compared > 5
+
+
+@pytest.fixture(scope="module")
+def tracked(town_filter, walk):
+    """A state that follows from a known start, the next epoch, the generator, the estimate."""
+    rng, start = np.random.default_rng(3), walk.truth.iloc[0]
+    state = town_filter.begin_at(start["east_m"], start["north_m"], 5.0, rng)
+    *first, epoch = epochs(walk)[:21]
+    for one in first:
+        state, output = town_filter.step(state, one, rng)
+    return state, epoch, rng, output.fix
+
+
+@pytest.mark.parametrize(("distrusts", "rows"), [("belief", 1), ("alternative", 2)])
+def test_a_fix_that_only_the_belief_or_its_alternative_uses(town_filter, tracked, distrusts, rows):
+    """Where readings have led one of them away they are on trial; the other one uses them."""
+    before, epoch, rng, fix = tracked
+    own, others = (
+        {**before.sources, "gnss": replace(before.sources["gnss"], distrusted=distrusts == one)}
+        for one in ("belief", "alternative")
+    )
+    made_of = before.reckoning.travelled_m, before.belief.log_evidence, epoch.time_s
+    beside = AlternativeHypothesis(before.belief, *made_of, sources=others)
+    state = replace(before, sources=own, alternative=beside)
+    alone = replace(epoch, radio=(), fix=GnssFix(fix.east_m, fix.north_m, 25.0, 25.0, 0.0))
+    after, output = town_filter.step(state, alone, copy.deepcopy(rng))
+    found = explained(town_filter, (state, alone, rng, after, output))
+    assert [row.what for row in found.rows] == ["streets", "gnss"][:rows]
+    assert [row.alternative for row in found.rows[1:]] == [0.0] * (rows - 1)
 
 
 def test_differences_add_up_to_the_change_of_log_odds(town_filter, steps):

@@ -37,6 +37,18 @@ def test_degrees_are_projected(tmp_path):
     assert np.diff(reports.first).tolist() == [1, 0]
 
 
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_decimal_commas_are_read_where_they_separate_nothing(tmp_path, separator):
+    text = "lon;lat;a;b\n24,94;60,17;-70,5;-81\n24,95;60,18;100;-64.25\n;;-64;\n"
+    reports = read(tmp_path, text.replace(";", separator))
+    assert reports.crs == "EPSG:32635"
+    assert np.isfinite(reports.east_m).tolist() == [True, True, False]
+    assert reports.level_dbm.tolist() == [-70.5, -81, -64.25, -64]
+    assert reports.places[0] == pytest.approx(
+        read(tmp_path, "lon,lat,a\n24.94,60.17,-70\n").places[0]
+    )
+
+
 @pytest.mark.parametrize("header", ["x,y,lon,lat", "east_m,north_m,longitude,latitude"])
 def test_degrees_beside_metres_are_no_levels(tmp_path, header):
     """West of Greenwich a longitude could be a level in dBm."""

@@ -336,9 +336,9 @@ def test_which_rows_are_taken():
     assert [(one.kind, one.what, one.reason) for one in found.unused] == [
         ("neighbour", "ARFCN 601, BSIC unknown", Reason.AMBIGUOUS_CELL),
         ("neighbour", "ARFCN 700, BSIC 1", Reason.UNKNOWN_CELL),
-        ("neighbour", "C", Reason.NOT_USED_BY_FILTER),
         ("neighbour", "Z", Reason.UNKNOWN_CELL),
         ("neighbour", "", Reason.NO_CELL),
+        ("neighbour", "C", Reason.NOT_USED_BY_FILTER),
     ]
     assert {one.time_s for one in found.unused} == {3.0}
 

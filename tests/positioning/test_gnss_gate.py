@@ -428,6 +428,12 @@ def test_satellites_of_another_place_are_rejected_and_then_on_probation(known):
     assert ("gnss", "", Reason.REJECTED_BY_EVIDENCE) in both.unused
     assert sum(why is Reason.ON_PROBATION for *_, why in both.unused) == 6
     assert both.under_null == 0.0
+    # And the other way around: one that agrees is not used, either.
+    both = compared(belief, state, 11.0, 101.0, fix=fix_at(), ranges=elsewhere)
+    assert ("gnss", "", Reason.ON_PROBATION) in both.unused
+    assert sum(why is Reason.REJECTED_BY_EVIDENCE for *_, why in both.unused) == 6
+    assert (both.state.fix_used_at_m, both.state.excess) == (-inf, 1.0)
+    assert np.all(sum_of(both.terms, belief) == 0.0)
 
 
 def test_a_belief_that_is_no_cloud_leaves_pseudoranges():

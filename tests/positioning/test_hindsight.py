@@ -275,6 +275,22 @@ def test_an_alternative_that_took_over_replaces_what_was_kept_since(won):
     assert history.alternative == []
 
 
+def test_an_alternative_that_was_begun_in_place_of_another_has_none_of_its_beliefs():
+    """Two of one time would make paths go back and forth."""
+    history = BayesSmoother(AREA, ERRORS, every_m=1.0)
+    main, first, last = (cloud((x, 1.0, 0, 0)) for x in (1.0, 5.0, 9.0))
+    one, other = (
+        SimpleNamespace(belief=at(0, state).belief, start_m=MOVED[epoch][2])
+        for epoch, state in ((1, first), (3, last))
+    )
+    tracks = [at(0, main), at(1, main, one), at(2, main, one), at(3, main, other)]
+    tracks += [at(4, last, takeovers=1)]
+    for before, after in zip([tracks[0], *tracks], tracks, strict=False):
+        history.add(before, after)
+    assert [k.epoch for k in history.kept] == [0, 1, 2, 3, 4]
+    assert [float(k.state[0, 0]) for k in history.kept] == [1.0, 1.0, 1.0, 9.0, 9.0]
+
+
 def test_beliefs_whose_phone_was_not_turned_are_dropped_once_it_was():
     """They were those of another way, from the jump of the heading on."""
     history, turned = BayesSmoother(AREA, ERRORS, every_m=1.0), Hold(1.0, 3.0)

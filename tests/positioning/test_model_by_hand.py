@@ -8,6 +8,7 @@ import pytest
 from made_radio import AREA, MODEL, at_places, gain_of, named, read, serving
 from small_area import HEIGHT_M, OPTIONS, WIDTH_M
 
+from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.models.way_map import MapWeights
 from mapfilter.positioning.bayes.evidence import FixedTerm, RadioReading
@@ -95,6 +96,18 @@ def test_beyond_the_edge_nothing_that_is_predicted_may_hold(tracked):
     expected = np.logaddexp(weight[0], odds + again.radio_under_null(0.0)) - np.logaddexp(0.0, odds)
     assert np.isfinite(expected)
     assert weight[1] != pytest.approx(weight[0], abs=1e-3)
+
+
+@pytest.mark.parametrize("tracked", [False, True])
+def test_a_hypothesis_without_weight_stays_without_beyond_the_edge(tracked):
+    """It is none that makes the weights of all others no numbers."""
+    reading = replace(read(serving("A", -70.25), named("C", -82.0))[1], tracked=tracked)
+    states = at_places((1.0, 35.0), (-30.0, 35.0), (-30.0, 35.0))
+    alike, weight = np.zeros(3), np.array([0.0, -inf, 0.0])
+    cloud = Cloud(states, np.empty((0, 3), dtype=np.float32))
+    MODEL.weigh(cloud, alike, reading)
+    MODEL.weigh(cloud, weight, reading)
+    assert weight.tolist() == [alike[0], -inf, alike[2]]
 
 
 @pytest.mark.parametrize("length_m", [10.0, -4.0])

@@ -73,6 +73,15 @@ def test_sensors_that_do_not_measure_are_told_with_their_rows(monkeypatch, motio
 
 
 @pytest.mark.parametrize(
+    ("served", "label"),
+    [("X", ("serving", "X", Reason.UNKNOWN_CELL)), (None, ("serving", "", Reason.NO_SERVING_CELL))],
+)
+def test_a_serving_cell_that_is_not_used_is_named_and_no_neighbour(served, label):
+    rows = replace(ROW, role="neighbour"), replace(ROW, cell=served)
+    assert told(stepped(given={"radio": rows})[1])[-1] == label
+
+
+@pytest.mark.parametrize(
     ("changes", "left", "motion", "label"),
     [
         # A phone that was turned is ahead: told with each step.

@@ -140,3 +140,15 @@ def test_the_world_may_lie_elsewhere(whole, elsewhere, name):
 def test_what_is_recorded_besides_changes_nothing(whole, database, name):
     found = located(database, tables(), name, record=True, snapshots=True)
     pd.testing.assert_frame_equal(found, whole, check_exact=True)
+
+
+@pytest.mark.parametrize("name", ["candidate", "ekf"])
+def test_the_order_of_the_rows_of_a_report_changes_nothing(database, name):
+    """The draws of ``bayes`` follow the rows: another order is like another seed."""
+    given = tables()
+    turned = given["radio"].iloc[::-1].sort_values("time_s", kind="stable", ignore_index=True)
+    assert (turned["role"].iloc[0], given["radio"]["role"].iloc[0]) == ("neighbour", "serving")
+    found, before = (
+        located(database, given | {"radio": one}, name) for one in (turned, given["radio"])
+    )
+    pd.testing.assert_frame_equal(found, before)

@@ -1,5 +1,6 @@
 """Levels and timing advances of a report that Kalman-type filters use, and why not the others."""
 
+from itertools import permutations
 from math import nan
 
 import pytest
@@ -43,10 +44,20 @@ def reasons(found):
     return [(one.kind, one.what, one.reason) for one in found.unused]
 
 
-def test_levels_are_those_of_known_cells_in_their_order():
-    found = read(row("neighbour", "B", -80.0), row("serving", "A", -71.0))
-    assert (found.cells, found.levels_dbm) == (("B", "A"), (-80.0, -71.0))
-    assert (found.timed, found.steps, found.unused) == ((), (), ())
+@pytest.mark.parametrize("order", list(permutations(range(4))))
+def test_levels_are_those_of_known_cells_whatever_their_order(order):
+    """A filter begins at the first cell: 30 m aside where that was any of them."""
+    given = (
+        row("serving", "A", -71.0), row("neighbour", "B", -62.0, steps=3.0),
+        row("neighbour", "C", -80.0, steps=5.0), row("neighbour", "D", nan, steps=4.0),
+    )  # fmt: skip
+    found = read(*(given[at] for at in order))
+    assert (found.cells, found.levels_dbm) == (("A", "B", "C"), (-71.0, -62.0, -80.0))
+    assert (found.timed, found.steps, found.unused) == (("B", "C", "D"), (3, 5, 4), ())
+
+
+def test_of_several_serving_cells_the_first_comes_first():
+    assert read(row("serving", "B", -80.0), row("serving", "A", -71.0)).cells == ("B", "A")
 
 
 def test_an_unknown_cell_is_named():
@@ -101,7 +112,7 @@ def test_neighbours_are_named_by_carrier_and_bsic(arfcn, bsic, name, reason):
 def test_without_a_serving_cell_all_of_a_carrier_may_be_meant():
     found = read(row("neighbour", None, -85.0, 12, 1), row("serving", None, -70.0))
     assert reasons(found) == [
-        ("neighbour", "ARFCN 12, BSIC 1", Reason.AMBIGUOUS_CELL), ("serving", "", Reason.NO_CELL),
+        ("serving", "", Reason.NO_CELL), ("neighbour", "ARFCN 12, BSIC 1", Reason.AMBIGUOUS_CELL),
     ]  # fmt: skip
     assert read(row("neighbour", None, -85.0, 13, 1)).cells == ("G",)
 
@@ -109,4 +120,4 @@ def test_without_a_serving_cell_all_of_a_carrier_may_be_meant():
 def test_the_serving_cell_is_not_the_first_one_that_is_named():
     """Near the serving cell there is E; near the neighbour that stands before it F's namesake."""
     found = read(row("neighbour", "F"), row("serving", "A"), row("neighbour", None, -80.0, 12, 1))
-    assert found.cells == ("F", "A", "E")
+    assert found.cells == ("A", "F", "E")

@@ -385,6 +385,27 @@ def test_a_fix_where_the_reported_cell_is_not_received_is_searched_for_as_well(d
     assert ((x >= west) & (x <= east) & (y >= south) & (y <= north)).any()
 
 
+def test_reports_are_used_after_a_first_fix_in_tiles_without_ways(database, whole):
+    """None of the first hypotheses is on a way then, and one of no weight may leave the area."""
+    tiled = TiledArea.of_database(database, side=4, search_tiles=9)
+    row, col = np.unravel_index(whole.distance_m[40:-40, 40:-40].argmax(), (100, 100))
+    place_m = (col + 40.5) * PIXEL_M, SIDE_M - (row + 40.5) * PIXEL_M
+    assert not searched_tiles(
+        tiled, RadioReading(terms=(fix_term(place_m, 1.0),)), LevelErrors()
+    ).points.size
+    times = np.arange(4.0)
+    motion = pd.DataFrame({"time_s": times[1:], "step_m": 10.0, "heading_rad": 0.5})
+    radio = pd.DataFrame({"time_s": times[1:], "role": "serving", "cell": "A"})
+    log = make_log(CRS, motion=motion, radio=radio, gnss=fixes(place_m, sigma_m=1.0))
+    positioner = BayesFilter(max_particles=400, min_search_particles=300, min_particles=200)
+    rng, bound = np.random.default_rng(5), positioner.over_area(tiled)
+    state = bound.begin()
+    for epoch in epochs(log):
+        state, output = bound.step(state, epoch, rng)
+        assert not output.unused
+        assert np.exp(state.belief.log_weight).sum() > 0
+
+
 def test_a_timing_advance_decides_how_far_from_its_site_is_searched(database):
     """Steps of 78 m: 2 to 3 of them from the site, where the cell is not strongest."""
     tiled = TiledArea.of_database(database, side=20, search_tiles=5)

@@ -87,6 +87,22 @@ def test_cells_of_one_curve_differ_in_the_noise_of_headings_alone():
         assert len({(one.reading, one.sigma_trans_m) for one in cells}) == 1
 
 
+def test_an_error_and_what_a_filter_assumes_of_it_are_two_coordinates():
+    """Options of filters have the names of the errors."""
+    key = "filter.bayes.bias_sd_deg"
+    first = replace(cell(6.0, 0.2, 0.5), reading="set")
+    cells = [
+        replace(first, bias_sd_deg=bias, varied={key: assumed})
+        for bias in (3.0, 4.0)
+        for assumed in (2.0, 8.0)
+    ]
+    axis = curve_axis(cells)
+    curves = dict(success_curves(cells, axis))
+    assert axis == "bias_sd_deg"
+    assert list(curves) == [f"set, {key} 2", f"set, {key} 8"]
+    assert all([one.bias_sd_deg for one in some] == [3.0, 4.0] for some in curves.values())
+
+
 def test_what_belongs_to_a_filter_is_not_in_the_name_of_its_curve():
     cells = [replace(cell(3.0 * i, 0.2, 0.5), varied={}) for i in range(2)]
     both = [*(replace(one, reading="a", update_length_m=5.0) for one in cells)]

@@ -184,6 +184,10 @@ def test_rasters_that_do_not_fit(write, tmp_path):
         source.transform = rasterio.Affine(5, 1, 531_000, 1, -5, 4_556_000)
     with pytest.raises(InputError, match="rotated"):
         read_landuse(path, table, LATTICE)
+    with rasterio.open(path, "r+") as source:
+        source.transform = rasterio.Affine(-5, 0, 531_030, 0, -5, 4_556_000)
+    with pytest.raises(InputError, match="mirrored"):
+        read_landuse(path, table, LATTICE)
     far = Lattice(CRS, 600_000.0, 4_556_000.0, 5.0, 4, 6)
     with pytest.raises(InputError, match="another area"):
         read_landuse(*write(VALUES, lattice=far), LATTICE)

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import json
+import time
 from dataclasses import dataclass
 
 from positioning.cross_world import walk_log
@@ -84,6 +85,7 @@ class Streamed:
 
     def __init__(self, app, path, headers=None, query=b""):
         self.gone, self.parts = asyncio.Event(), asyncio.Queue(maxsize=1)
+        self.answered = asyncio.Event()
         scope, messages = request("GET", path, headers={**JSON, **(headers or {})}, query=query)
 
         async def receive():
@@ -92,18 +94,34 @@ class Streamed:
             await self.gone.wait()
             return {"type": "http.disconnect"}
 
-        self.task = asyncio.ensure_future(app(scope, receive, self.parts.put))
+        async def send(message):
+            self.answered.set()
+            await self.parts.put(message)
+
+        self.task = asyncio.ensure_future(app(scope, receive, send))
+
+    async def begun(self):
+        """Wait until the service has answered: it listens from then on."""
+        await asyncio.wait_for(self.answered.wait(), 60)
 
     async def take(self, count):
         """Return the next events with data, as (name, number, document)."""
         found = []
         while len(found) < count:
-            part = await asyncio.wait_for(self.parts.get(), 20)
+            part = await asyncio.wait_for(self.parts.get(), 60)
             lines = part.get("body", b"").decode().splitlines()
             held = dict(line.split(": ", 1) for line in lines if line and line[0] != ":")
             if "data" in held:
                 found.append((held["event"], held.get("id"), json.loads(held["data"])))
         return found
+
+
+async def left(session):
+    """Wait until nobody listens to a session."""
+    until_s = time.monotonic() + 60
+    while session.channel.listeners:
+        assert time.monotonic() < until_s
+        await asyncio.sleep(0.01)
 
 
 @contextlib.contextmanager

@@ -3,13 +3,13 @@
 import asyncio
 import copy
 import json
-import time
+import threading
 from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from asking import SERVING, Streamed, ask, documents, service
+from asking import SERVING, Streamed, ask, documents, left, service
 
 from mapfilter.errors import ConfigError, StoreError
 from mapfilter.gnss.almanacs import nominal_gps
@@ -234,7 +234,7 @@ def test_sessions_end_when_deleted_or_idle_and_leave_nothing(positioner, cross, 
             full = await ask(app, "POST", "/sessions", {})
             assert (full.code, full.reason) == (503, "tooManySessions")
             stream = Streamed(app, f"/sessions/{one}/events")
-            await asyncio.sleep(0)
+            await stream.begun()
             assert (await ask(app, "DELETE", f"/sessions/{one}")).code == 204
             assert await stream.take(1) == [("end", None, {"reason": "deleted"})]
             await stream.parts.get()
@@ -374,7 +374,7 @@ def test_listeners_get_fixes_and_what_they_missed(positioner, cross, whole):
             session = await begin(app)
             path = f"/sessions/{session}/events"
             one = Streamed(app, path)
-            await asyncio.sleep(0.01)
+            await one.begun()
             await post(app, session, sent[:10])
             events = await one.take(10)
             assert [json.loads(number) for _, number, _ in events] == list(range(1, 11))
@@ -386,8 +386,7 @@ def test_listeners_get_fixes_and_what_they_missed(positioner, cross, whole):
             for stream in (one, late):
                 stream.gone.set()
                 stream.parts = asyncio.Queue()
-            await asyncio.sleep(0.05)
-            assert made.sessions.all[session].channel.listeners == set()
+            await left(made.sessions.all[session])
 
         asyncio.run(run())
 
@@ -400,7 +399,7 @@ def test_a_listener_that_takes_nothing_is_cut_off_and_holds_nobody_up(positioner
             app = made.app()
             session = await begin(app)
             slow = Streamed(app, f"/sessions/{session}/events")
-            await asyncio.sleep(0.01)
+            await slow.begun()
             assert await post(app, session, sent) == whole
             await asyncio.wait_for(slow.task, 20)
             assert made.sessions.all[session].channel.listeners == set()
@@ -426,8 +425,11 @@ def test_a_session_whose_client_went_while_it_began_is_not_there(
     where = sessions_module if slow == "first" else SessionStore
     whole = getattr(where, slow)
 
+    begun, go = threading.Event(), threading.Event()
+
     def slowly(*given):
-        time.sleep(0.2)
+        begun.set()
+        assert go.wait(60)
         return whole(*given)
 
     monkeypatch.setattr(where, slow, slowly)
@@ -435,9 +437,10 @@ def test_a_session_whose_client_went_while_it_began_is_not_there(
 
         async def run():
             task = asyncio.ensure_future(made.sessions.create({}))
-            await asyncio.sleep(0.1)
+            assert await asyncio.to_thread(begun.wait, 60)
             assert len(made.sessions.all) == 1
             task.cancel()
+            go.set()
             with pytest.raises(asyncio.CancelledError):
                 await task
             assert made.sessions.all == {}

@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from asking import JSON, Streamed, ask, documents, service
+from asking import JSON, Streamed, ask, documents, left, service
 
 from mapfilter.serving import steps
 from mapfilter.serving.events import KEPT_FIXES, Channel
@@ -137,7 +137,8 @@ def test_a_watched_session_gives_the_same_fixes_with_details_and_beliefs(made):
         session, other = await begin(app), await begin(app)
         page = Streamed(app, f"/sessions/{session}/events", query=b"detail=1")
         plain = Streamed(app, f"/sessions/{session}/events")
-        await asyncio.sleep(0.05)
+        await page.begun()
+        await plain.begun()
         for one in sent[:COUNT]:
             await post(app, session, [one])
         alone = await post(app, other, sent)
@@ -167,12 +168,12 @@ def test_a_page_that_comes_back_misses_nothing_that_is_kept(made):
         session = await begin(app)
         path = f"/sessions/{session}/events"
         page = Streamed(app, path, query=b"detail=1")
-        await asyncio.sleep(0.05)
+        await page.begun()
         await post(app, session, sent[:5])
         assert [n for name, n, _ in await page.take(6) if name == "fix"] == list("12345")
         page.gone.set()
         page.parts = asyncio.Queue()
-        await asyncio.sleep(0.05)
+        await left(held.sessions.all[session])
         # Cut off: details are made for a while all the same.
         await post(app, session, sent[5:8])
         by_header = Streamed(app, path, {"last-event-id": "5"}, query=b"detail=1&after=2")
@@ -197,7 +198,7 @@ def test_nothing_is_described_where_nobody_watches(made, monkeypatch):
         app = held.app()
         session = await begin(app)
         plain = Streamed(app, f"/sessions/{session}/events")
-        await asyncio.sleep(0.02)
+        await plain.begun()
         await post(app, session, sent)
         return await plain.take(4)
 
@@ -235,11 +236,11 @@ def test_so_many_sessions_may_be_watched_and_no_more(made):
         app = held.app()
         one, other = await begin(app), await begin(app)
         first = Streamed(app, f"/sessions/{one}/events", query=b"detail=1")
-        await asyncio.sleep(0.05)
+        await first.begun()
         full = await ask(app, "GET", f"/sessions/{other}/events", query=b"detail=1")
         assert (full.code, full.reason) == (429, "tooManyRequests")
         plain = Streamed(app, f"/sessions/{other}/events")
-        await asyncio.sleep(0.02)
+        await plain.begun()
         assert len(held.sessions.all[other].channel.listeners) == 1
         assert first.task.done() is False
         plain.gone.set()
@@ -255,7 +256,8 @@ def test_the_last_place_to_watch_is_given_once(made):
         app = held.app()
         ids = [await begin(app) for _ in range(3)]
         streams = [Streamed(app, f"/sessions/{one}/events", query=b"detail=1") for one in ids]
-        await asyncio.sleep(0.3)
+        for stream in streams:
+            await stream.begun()
         return [len(held.sessions.all[one].channel.listeners) for one in ids], streams
 
     found, _ = asyncio.run(run())
@@ -269,7 +271,7 @@ def test_a_full_session_is_refused_before_its_belief_is_made(made):
         app = held.app()
         session = await begin(app)
         first = Streamed(app, f"/sessions/{session}/events")
-        await asyncio.sleep(0.05)
+        await first.begun()
         answer = await ask(app, "GET", f"/sessions/{session}/events", query=b"detail=1")
         now_s = time.monotonic()
         return answer.code, held.sessions.all[session].channel.is_watched(now_s), first

@@ -229,6 +229,9 @@ def test_epochs_are_those_of_a_log_with_the_same_rows():
             {"role": "neighbour", "cell": "b", "level_dbm": -80.5, "censored": -1},
             {"role": "neighbour", "arfcn": 7, "bsic": 1},
             {"role": "neighbour", "cell": "262-1-5-77", "technology": "GSM"},
+            # Neighbours that are known by their level alone are two where they are equal.
+            {"role": "neighbour", "arfcn": 7, "level_dbm": -90.0},
+            {"role": "neighbour", "arfcn": 7, "level_dbm": -90.0},
         ],
         "gnss": [{"east_m": 531_000.0, "north_m": 4_556_000.0, "var_east_m2": 4.0}],
         "pseudoranges": [

@@ -47,6 +47,16 @@ def test_states_come_back_to_the_bit_with_the_same_objects_shared(states):
             assert again.reported.belief is again.belief
 
 
+def test_a_summary_that_does_not_follow_from_particles_comes_back(states):
+    """After particles were drawn anew it is that of those before, by which the next epoch goes."""
+    belief = replace(states[-1].belief)
+    vars(belief)["summary"] = belief.summary._replace(mass_50m=0.125)
+    again = decode(encode({"belief": belief}), "made")["belief"]
+    assert repr(again.summary) == repr(belief.summary)
+    fresh = replace(belief)
+    assert "summary" not in vars(decode(encode({"belief": fresh}), "made")["belief"])
+
+
 def classes_in(hint):
     """The classes that a type hint names, in whatever union or tuple."""
     parts = get_args(hint)

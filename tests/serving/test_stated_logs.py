@@ -133,6 +133,12 @@ def test_timing_advances_in_other_steps_are_refused(positioner, cross, stated, t
         assert answer_to(positioner, cross, stated, epoch(**row)).code == 200
 
 
+def test_words_for_technologies_are_understood_as_in_a_log(positioner, cross):
+    sent = epoch(technology="4G", timing_advance=2)
+    assert answer_to(positioner, cross, LTE, sent).code == 200
+    assert "those of 'LTE'" in answer_to(positioner, cross, {}, sent).json["error"]["message"]
+
+
 def test_steps_of_levels_that_no_session_states_are_noted(positioner, cross):
     row = {"level_step_db": 10.0}
     (note,) = answer_to(positioner, cross, {}, epoch(**row)).json["notes"]

@@ -101,6 +101,15 @@ def test_signals_beside_cells_are_levels_where_they_look_like_them(tmp_path, col
         assert any("(level_dbm?)" in name for name in found.unread)
 
 
+def test_cells_with_signals_and_nothing_else_are_read(tmp_path):
+    columns = {"time": TIME_S, "MCC": 244, "MNC": 91, "LAC": 3021, "CID": CI, "signal": LEVEL_DBM}
+    found = read_recording(written(tmp_path, columns))
+    np.testing.assert_array_equal(found.tables["radio"]["level_dbm"], LEVEL_DBM)
+    assert "signal: taken for levels in dBm, by its values" in found.notes
+    with pytest.raises(InputError, match="a recording in a known format"):
+        read_recording(written(tmp_path, {"time": TIME_S, "signal": LEVEL_DBM}))
+
+
 NETWORK_SURVEY = {
     "LTE": ("tac", "eci", "earfcn", "pci", "rsrp", 1300),
     "NR": ("tac", "nci", "narfcn", "pci", "ssRsrp", 640_000),

@@ -84,6 +84,14 @@ def test_fixes_far_from_the_truth_of_a_log_are_noted(moved, cause):
     assert not make_log("EPSG:32635", gnss=places, truth=places.assign(east_m=386_000.0)).notes
 
 
+@pytest.mark.parametrize("north_m", [6_672_000.0, 6_672_000 + 3 * TIME_S])
+def test_fixes_far_from_a_truth_on_round_metres_are_noted(north_m):
+    """At rest, or along a meridian of the grid."""
+    truth = pd.DataFrame({"time_s": TIME_S, "east_m": 385_000.0, "north_m": north_m})
+    (note,) = make_log("EPSG:32635", gnss=truth.assign(east_m=395_000.0), truth=truth).notes
+    assert note.startswith("gnss lies 10.0 km from the truth (median)")
+
+
 @pytest.mark.parametrize(
     ("lat", "lon"),
     [(50.5, 120.0), (-35.5, 174.8), (69.5, -160.0), (65.2, 180.0), (-17.5, -179.999)],

@@ -114,6 +114,16 @@ def test_elapsed_seconds_are_none_of_a_week(tmp_path):
         mf.read_log([fixes, cells(tmp_path / "cells.csv", sunday_s)])
 
 
+def test_times_of_day_are_no_seconds_of_a_week(tmp_path):
+    """On a Sunday, with which weeks of GPS begin."""
+    sunday_s = UTC_S + 2 * 86_400
+    place = "6010.2000,N,02456.1000,E,1,08,1.0,20.0,M,18.0,M,,"
+    lines = [f"$GPGGA,{100_000 + k // 60 * 100 + k % 60},{place}" for k in range(COUNT)]
+    (tmp_path / "fixes.nmea").write_text("\n".join(lines))
+    with pytest.raises(mf.MapfilterError, match="expected positions or speeds in common"):
+        mf.read_log([tmp_path / "fixes.nmea", cells(tmp_path / "cells.csv", sunday_s)])
+
+
 @pytest.mark.parametrize(
     ("name", "counted", "told"),
     [

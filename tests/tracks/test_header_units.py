@@ -110,3 +110,52 @@ def test_factors_of_one_quantity_agree():
     ):
         assert header_unit(field, column).factor == pytest.approx(factor)
     assert all(next(iter(units.values())) == 1.0 for units in UNITS.values())
+
+
+PLACE = {"Latitude (deg)": 60.1 + TIME_S / 1e4, "Longitude (deg)": 25.0}
+ROTATION = {f"Gyr {axis} (rad/s)": 0.1 for axis in "xyz"}
+FORCE = {f"Acc {axis} (m/s^2)": 9.8 for axis in "xyz"}
+
+
+@pytest.mark.parametrize(
+    ("columns", "tables"),
+    [
+        ({"Vehicle speed (m/s)": SPEED_MPS, "Yaw rate (rad/s)": RATE_RADPS}, {"odometry"}),
+        ({"Wheel speed (m/s)": SPEED_MPS}, {"odometry"}),
+        (
+            {**PLACE, "Wheel speed (m/s)": SPEED_MPS, "Yaw rate (rad/s)": RATE_RADPS},
+            {"positions", "odometry"},
+        ),
+        ({**PLACE, "Speed (km/h)": 3.6 * SPEED_MPS}, {"positions"}),
+        ({**PLACE, "Pressure (hPa)": 1000.0}, {"positions", "barometer"}),
+        ({**ROTATION, **FORCE}, {"gyroscope", "accelerometer"}),
+        ({"acc_x (m/s2)": 0.1, "acc_y (m/s2)": 0.1, "acc_z (m/s2)": 9.8}, {"accelerometer"}),
+    ],
+    ids=lambda given: "-".join(given),
+)
+def test_units_in_parentheses_alone_make_no_file_of_phyphox(tmp_path, columns, tables):
+    """Other columns than those of one sensor were lost, refused, or km/h were m/s."""
+    found = read(tmp_path, {"Time (s)": TIME_S, **columns})
+    assert found.format == "csv"
+    assert set(found.tables) == tables
+    for name in {"odometry", "positions"} & tables:
+        speed = found.tables[name]["speed_mps"].dropna()
+        assert speed.empty or speed.tolist() == pytest.approx(SPEED_MPS)
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        {"Latitude (°)": 60.1 + TIME_S / 1e4, "Longitude (°)": 25.0, "Height (m)": 10.0,
+         "Velocity (m/s)": SPEED_MPS, "Direction (°)": 90.0, "Horizontal Accuracy (m)": 5.0,
+         "Vertical Accuracy (°)": 3.0},
+        {"X (hPa)": 1000.0},
+        ROTATION | {"Absolute (rad/s)": 0.2},
+        {f"Linear Acceleration {axis} (m/s^2)": 0.1 for axis in "xyz"},
+    ],
+    ids=list,
+)  # fmt: skip
+def test_files_of_phyphox_are_known_by_the_columns_of_one_sensor(tmp_path, columns):
+    found = read(tmp_path, {"Time (s)": TIME_S, **columns})
+    assert found.format == "phyphox"
+    assert len(found.tables) == 1

@@ -8,6 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from mapfilter.errors import InputError, OutputError, StoreError
+from mapfilter.positioning.log_options import LogStatement
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.sensors import SENSOR_COLUMNS, read_sensors
 from mapfilter.tracks.store import read_log, write_log
@@ -40,6 +41,23 @@ def test_sensors_are_read_as_they_were_written(form, log, sensors, tmp_path):
     write_log(log, folder, form, {})
     assert read_sensors(folder) == {}
     assert not (folder / "sensors").exists()
+
+
+@pytest.mark.parametrize(
+    ("sensors", "told"),
+    [
+        ({"barometr": {"time_s": [0.0], "pressure_hpa": [1e3]}}, "'barometr' .likely: barometer"),
+        ({"barometer": {"time_s": [0.0]}}, "sensors, barometer: .* found no pressure_hpa"),
+        ({"barometer": {"time_s": ["x"], "pressure_hpa": [1e3]}}, "barometer, time_s: .* numbers"),
+        ({"barometer": {"time_s": pd.to_datetime(["2026-05-01 12:00Z"])}}, "barometer, time_s: "),
+    ],
+)
+def test_sensors_that_are_no_tables_of_a_log_are_refused(log, tmp_path, sensors, told):
+    """One of another name was not written, others ended in a traceback."""
+    tables = {name: pd.DataFrame(rows) for name, rows in sensors.items()}
+    with pytest.raises(InputError, match=told):
+        write_log(log, tmp_path / "log", sensors=tables)
+    assert not (tmp_path / "log").exists()
 
 
 def test_a_log_without_sensors_has_none(log, tmp_path):
@@ -138,6 +156,25 @@ def test_carriers_and_codes_are_checked_by_technology():
         with pytest.raises(InputError, match=rf"{column}: expected {expected}, found {value}"):
             make_log(UTM, radio=report(technology=technology, **{column: value}))
     make_log(UTM, radio=report(arfcn=66_486, bsic=503))
+
+
+@pytest.mark.parametrize(
+    ("word", "name", "notes"),
+    [
+        ("4G", "LTE", 0),
+        ("lte", "LTE", 0),
+        ("NR", "NR", 0),
+        ("WIFI", "WIFI", 0),
+        ("6G", "6G", 1),
+    ],
+)
+def test_words_for_technologies_are_understood_and_others_noted(word, name, notes):
+    log = make_log(UTM, radio=report(technology=word, timing_advance=12))
+    assert log.radio["technology"].tolist() == [name]
+    stated = LogStatement.of_log(log).technology
+    assert stated == (name if name == "LTE" else None)
+    found = [note for note in log.notes if "technology: '6G' not known, taken for none" in note]
+    assert len(found) == len(log.notes) == notes
 
 
 def test_columns_of_identity_are_only_where_they_were_given(tmp_path):

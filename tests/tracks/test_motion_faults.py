@@ -13,6 +13,7 @@ import mapfilter as mf
 from mapfilter.geodesy import unproject
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.log_options import fitted_to_log
+from mapfilter.tracks.motion_factors import scaled_motion
 from mapfilter.tracks.motion_fault import fault_notes
 from mapfilter.tracks.motion_faults import motion_faults, step_fault
 from mapfilter.tracks.turn_faults import turn_fault
@@ -375,3 +376,11 @@ def test_rows_of_which_three_have_one_time_have_a_factor():
     rates = np.diff(heading, prepend=0.0)[of_row]
     turned = turn_fault(rows.assign(step_m=10 / 3, turn_rad=rates), truth)
     assert turned.factor == pytest.approx(1 / 3, rel=0.01)
+
+
+def test_a_factor_of_steps_is_that_of_their_errors_too():
+    motion = pd.DataFrame({"step_m": [4.0, 5.0], "turn_rad": 0.1, "sampling_sd_m": [1.0, np.nan]})
+    scaled, _ = scaled_motion(motion, {"step_m": -FOOT_M, "turn_rad": 2.0}, "log")
+    assert scaled["sampling_sd_m"].fillna(0.0).tolist() == [FOOT_M, 0.0]
+    kept, _ = scaled_motion(motion, {"turn_rad": 2.0}, "log")
+    assert kept["sampling_sd_m"].equals(motion["sampling_sd_m"])

@@ -42,6 +42,21 @@ def test_sentences_without_a_time_pass_no_midnight(tmp_path):
     np.testing.assert_allclose(rows["time_s"], 23.9 * 3600 + 60 * np.arange(20.0))
 
 
+def test_positions_without_a_time_are_counted(tmp_path):
+    timeless = sentence("GPGGA,,6010.2000,N,02456.1000,E,1,08,1.0,20.0,M,18.0,M,,")
+    found = read(tmp_path, [gga(NOON_S), timeless, timeless, gga(NOON_S + 1)])
+    assert len(found.tables["positions"]) == 2
+    assert [(one.count, one.lines) for one in found.unusable] == [(2, (2, 3))]
+
+
+def test_stamps_beside_a_pause_tell_the_day_in_a_long_file(tmp_path):
+    """Of long files not every stamp is read."""
+    time_s = NOON_S + np.append(np.arange(2400.0), 90_000 + np.arange(2401.0))
+    stamps = pd.to_datetime(time_s, unit="s").strftime("%Y-%m-%d %H:%M:%S ")
+    lines = [stamps[k] + gga(one_s, k % 700) for k, one_s in enumerate(time_s)]
+    np.testing.assert_array_equal(read(tmp_path, lines).tables["positions"]["time_s"], time_s)
+
+
 @pytest.mark.parametrize(
     "before",
     [

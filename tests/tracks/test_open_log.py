@@ -209,3 +209,16 @@ def test_a_recording_that_is_truth_alone_gives_no_motion(steps_and_places, made)
         log = open_log(given, options=options).log
         assert (len(log.motion), len(log.truth)) == (0, 20)
         assert len(log.gnss) == COUNT
+
+
+def test_azimuths_are_turned_to_the_grid_of_positions_in_metres(tmp_path):
+    time_s = START_UTC_S + np.arange(50.0)
+    east, north = project(UTM, np.full(50, 24.5), 60 + np.arange(50) / 5000)
+    pd.DataFrame({"time": time_s, "wheel_speed_mps": 10.0, "compass_deg": 0.0}).to_csv(
+        tmp_path / "drive.csv"
+    )
+    pd.DataFrame({"time": time_s, "east_m": east, "north_m": north}).to_csv(tmp_path / "places.csv")
+    motion = mf.read_log([tmp_path / "drive.csv", tmp_path / "places.csv"], crs=UTM).motion
+    course = np.arctan2(north[-1] - north[0], east[-1] - east[0])
+    assert motion["heading_rad"].iloc[5] == pytest.approx(course, abs=1e-4)
+    assert course < np.radians(88)

@@ -199,8 +199,10 @@ def test_steps_are_not_known_where_a_receiver_loses_its_fix_while_it_moves():
     assert motion.loc[unknown, "time_s"].tolist() == [301.0]
     assert motion.loc[unknown, "turn_rad"].item() == pytest.approx(0.202, abs=0.02)
     assert notes[-1] == "1 gap of speeds (longest 202.0 s), over which turns alone are known"
-    parked = np.where((second > 95) & (second < 305), 0.0, 15.0)
+    parked = np.where((second > 95) & (second < 305), 0.2, 15.0)
     sensors["velocity"]["speed_mps"] = parked
     motion, _, notes = reckon_velocity(sensors)
     assert motion["step_m"].notna().all()
+    # What a receiver at rest states is noise, and was the speed of 200 s.
+    assert motion["step_m"][motion["time_s"] == 301.0].item() == 0.0
     assert not any("gap" in note for note in notes)

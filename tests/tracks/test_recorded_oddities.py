@@ -417,3 +417,36 @@ def test_unix_times_with_decimal_commas_beside_a_row_without_one(read, odd):
     lines = [f"{time:.2f};{60 + i / 1e5:.5f};25,0" for i, time in enumerate(TIME_S + 0.25)]
     written = "\n".join(["time;lat;lon", f"{odd};60,1;25,0", *lines, ""]).replace(".", ",")
     np.testing.assert_allclose(places(read(written=written))["time_s"], TIME_S + 0.25)
+
+
+@pytest.mark.parametrize("comments", [[0], [0, 3, 8]], ids=str)
+def test_poses_below_comments_have_the_times_of_their_frames(comments, tmp_path):
+    poses = [f"1 0 0 0 0 1 0 0 0 0 1 {k}" for k in range(12)]
+    for line in comments:
+        poses.insert(line, "# left camera")
+    (tmp_path / "00.txt").write_text("\n".join(poses))
+    (tmp_path / "times.txt").write_text("\n".join(f"{0.25 * k}" for k in range(12)))
+    found = read_recording(tmp_path / "00.txt")
+    assert found.notes == ("times by times.txt",)
+    assert found.tables["poses"]["time_s"].tolist() == (0.25 * np.arange(12)).tolist()
+
+
+@pytest.mark.parametrize(
+    ("columns", "tables"),
+    [
+        ({"lat": LAT, "lon": LON, "altitude": 20.0}, {"positions", "orientation"}),
+        ({"lat (deg)": LAT, "lon (deg)": LON, "alt (m)": 20.0}, {"positions", "orientation"}),
+        ({"x": EAST_M, "y": NORTH_M, "z": 0.0}, {"poses"}),
+        ({"X (m)": EAST_M, "Y (m)": NORTH_M, "Z (m)": 0.0}, {"poses"}),
+        (
+            {f"{sensor}_{axis}": 0.1 for sensor in ("acc", "gyr") for axis in "xyz"} | {"id": 1},
+            {"accelerometer", "gyroscope", "orientation"},
+        ),
+    ],
+    ids=lambda given: "-".join(given),
+)
+def test_as_many_columns_as_a_pose_has_are_a_plain_table_by_their_names(read, columns, tables):
+    """Positions beside an attitude were a trajectory in degrees."""
+    attitude = {"qx": 0.0, "qy": 0.0, "qz": 0.6, "qw": 0.8}
+    found = read(time=TIME_S, **columns, **attitude)
+    assert set(found.tables) == tables

@@ -7,9 +7,10 @@ from page_scripts import ran
 
 from mapfilter.filters.contract import Reason
 from mapfilter.positioning.epochs import Epoch, ReportRow
+from mapfilter.positioning.step_output import UnusedReading
 from mapfilter.radio.cells import CellPlan
 from mapfilter.viewing.arrays import packed, places, unpacked
-from mapfilter.viewing.readings import report_rows
+from mapfilter.viewing.readings import report_rows, unused_of
 from mapfilter.viewing.runs import _share
 
 SIDE = 'const side = () => MF.byId("side").textContent;'
@@ -60,6 +61,17 @@ def test_the_first_fix_is_shown_and_what_replaces_it():
     assert first.startswith("This momentsearching")
     assert "No epoch has come yet" not in first
     assert again.startswith("This momentlost")
+
+
+@pytest.mark.parametrize(("radius_m", "shown"), [(80.0, "unavailable"), (None, "–")])
+def test_a_protection_level_that_is_infinite_is_unavailable(radius_m, shown):
+    """As in a replay; without a position there is none."""
+    task = """live.run.push({ number: 1, time_s: 1, status: "TRACKING", reason: "used",
+      hypotheses: 9, way_id: 0, unused: [], east_m: null, runner_up_east_m: null,
+      radius_99_m: radius, protection_m: null });
+    for (const one of live.listeners) one("live"); draw(); draw(); return side();"""
+    found = ran(LIVE + SIDE + task, bundle=live_bundle(), radius=radius_m)
+    assert f"Protection level{shown}Error" in found
 
 
 @pytest.mark.parametrize("key", ["ArrowLeft", "ArrowRight", " "])
@@ -218,6 +230,19 @@ def test_rows_of_a_report_tell_which_levels_are_ends_of_the_scale():
     plan = CellPlan("EPSG:32635", ())
     rows = report_rows(Epoch(0.0, (), report), Reason.USED, ({}, frozenset()), plan, {})
     assert tuple(row.censored for row in rows) == ends
+
+
+def test_of_rows_of_one_cell_the_last_ones_are_those_that_are_not_used():
+    """Two reports of one second: the first serving cell counts."""
+    report = tuple(ReportRow("serving", "A", None, None, level, 0) for level in (-70.0, -71.0))
+    second = UnusedReading(0.0, "serving", "A", Reason.SECOND_SERVING_CELL)
+    plan = CellPlan("EPSG:32635", ())
+    for unused, uses in (
+        ([second], [Reason.USED, second.reason]),
+        ([second] * 2, [second.reason] * 2),
+    ):
+        rows = report_rows(Epoch(0.0, (), report), Reason.USED, unused_of(unused), plan, {})
+        assert [row.use for row in rows] == uses
 
 
 def test_a_narrow_scale_in_the_legend_has_three_numbers():

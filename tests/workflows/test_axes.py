@@ -46,7 +46,13 @@ def test_each_axis_changes_what_a_sweep_runs(key):
     assert before != after
 
 
-@pytest.mark.parametrize("key", ["journeys.count", "journeys.seed", "database.tile_px"])
+@pytest.mark.parametrize(
+    "key",
+    [
+        *("journeys.count", "journeys.seed", "database.tile_px", "filter.kalman.timing_memory_m"),
+        *(f"filter.kalman.fix_lasting_{name}" for name in ("share", "m", "s")),
+    ],
+)
 def test_what_a_sweep_does_not_use_is_no_axis(key):
     assert key not in numeric_keys()
     with pytest.raises(ConfigError, match="expected an option that a sweep uses"):

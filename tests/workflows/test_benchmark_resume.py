@@ -40,6 +40,9 @@ def test_what_real_sessions_take_no_heed_of_is_refused(tmp_path):
     more = ["--case", "cell-6", "--filter", "grid", *settings(filter__bayes__scale=0.1)]
     told = mapfilter("evaluate", "ottawa", "--data", tmp_path, *more, "--out", tmp_path / "out")
     assert_refused(told, "--case", "--filter", "--set", "ottawa takes none")
+    more = ["--seed", 1, "--resume"]
+    told = mapfilter("evaluate", "single-reports", "--data", tmp_path, *more, "--out", tmp_path)
+    assert_refused(told, "--seed", "--resume", "single-reports takes none")
 
 
 def test_a_length_is_refused_where_cases_have_their_own(world, tmp_path):

@@ -1,6 +1,7 @@
 """``mapfilter locate``: logs, tables and databases in; a table, figures and a picture out."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -82,6 +83,17 @@ def test_equal_inputs_give_equal_tables(folder, tmp_path):
         )  # fmt: skip
     one, two = ((tmp_path / name / "positions.csv").read_bytes() for name in ("one", "two"))
     assert one == two
+
+
+def test_surveys_along_a_line_on_round_metres(tmp_path):
+    """A corridor that has no width."""
+    rng = np.random.default_rng(3)
+    for name in ("surveys/one", "surveys/two", "walk"):
+        log = walk(rng)
+        on_line = log.truth.assign(east_m=_ORIGIN_M[0])
+        write_log(replace(log, truth=on_line), tmp_path / name)
+    given = ("--db", tmp_path / "surveys", "--log", tmp_path / "walk", "--out", tmp_path / "out")
+    assert assert_done(mapfilter("locate", *given, "--json")).json["located"] > 60
 
 
 def test_without_truth_there_is_no_score_and_no_picture(folder, tmp_path):

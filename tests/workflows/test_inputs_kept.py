@@ -57,6 +57,70 @@ def test_results_are_not_written_into_inputs(own_world, place):
     assert contents(own_world.folder) == before
 
 
+def test_single_reports_and_bounds_are_not_written_into_inputs(own_world):
+    before = contents(own_world.folder)
+    log = own_world.journeys / ONE
+    for folder in (own_world.database, log):
+        given = ["--db", own_world.database, "--log", log, "--out", folder]
+        assert_refused(mapfilter("locate", *given), "--out", "which is an input")
+    refused = mapfilter("bound", own_world.database, "--out", own_world.database / "bound")
+    assert_refused(refused, "--out", "which is an input")
+    assert contents(own_world.folder) == before
+
+
+def test_results_of_several_logs_are_not_written_into_these(own_world):
+    """Each has a folder of its name."""
+    before = contents(own_world.folder)
+    given = ["--db", own_world.database, "--log", own_world.journeys]
+    refused = mapfilter("replay", "-c", own_world.toml, *given, "--out", own_world.journeys)
+    assert_refused(refused, f"--out: expected a folder outside {own_world.journeys / ONE}")
+    assert contents(own_world.folder) == before
+
+
+@pytest.fixture
+def recordings(tmp_path):
+    """A folder with a recording of positions."""
+    folder = tmp_path / "walk"
+    folder.mkdir()
+    rows = [f"{1_700_000_000 + i},{60.166 + 1e-5 * i:.5f},24.94,-70,A" for i in range(40)]
+    (folder / "positions.csv").write_text("\n".join(["time,lat,lon,level_dbm,cell", *rows]))
+    return folder
+
+
+def test_results_are_not_written_among_recordings(recordings):
+    """They would be read with them next time: an estimate as GNSS fixes."""
+    before = contents(recordings)
+    given = ["replay", "--filter", "ekf", "--log", recordings]
+    assert_refused(mapfilter(*given, "--out", recordings), "--out", "which is an input")
+    assert contents(recordings) == before
+    undrawn = settings(output__pictures="none")
+    assert_done(mapfilter(*given, *undrawn, "--out", recordings / "located"))
+    assert_done(mapfilter(*given, *undrawn, "--out", recordings / "located"))
+
+
+@pytest.mark.parametrize("log", [".", "positions.csv"])
+def test_a_recording_called_positions_is_not_replaced_by_positions(recordings, log):
+    before = contents(recordings)
+    given = ["--db", recordings, "--log", recordings / log, "--out", recordings]
+    assert_refused(mapfilter("locate", *given), "--out", "which is an input")
+    given[1] = recordings / "positions.csv"
+    if log != ".":
+        told = "positions.csv: expected positions of mapfilter locate, or nothing yet"
+        assert_refused(mapfilter("locate", *given), told, "another folder by --out")
+    assert contents(recordings) == before
+
+
+def test_the_map_of_a_survey_is_not_written_among_its_measurements(recordings):
+    """Its cells would be read as measurements next time."""
+    before = contents(recordings)
+    given = settings(
+        area__map="none", prediction__model="survey", prediction__survey__files=recordings
+    )
+    told = "cells.csv: expected another place", "folder of prediction.survey.files"
+    assert_refused(mapfilter("predict", *given, "--out", recordings), *told)
+    assert contents(recordings) == before
+
+
 def test_journeys_go_where_the_database_is(own_world):
     """In an area that is wider than the rasters, as when a planner's export is smaller."""
     wider = settings(area__bbox="24.9390,60.1645,24.9530,60.1710", rasters__path=own_world.rasters)

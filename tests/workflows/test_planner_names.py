@@ -8,6 +8,7 @@ import rasterio
 from command_line import assert_done, assert_refused, mapfilter, settings
 from rasterio.warp import Resampling, reproject
 
+from mapfilter.geodesy import unproject
 from mapfilter.radio.plan_files import read_cell_plan
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.opening import open_rasters
@@ -57,6 +58,40 @@ def test_a_common_prefix_or_suffix_is_recognised(pattern, export, own_world):
     assert not [f for f in found if "raster" in f["code"] and "cell" in f["code"]]
     simulated = assert_done(mapfilter("simulate", "-c", own_world.toml, "--json")).json
     assert (note in simulated["notes"]) == (pattern != "{}")
+
+
+def test_names_and_notes_of_what_drive_tests_calibrate(export, own_world, tmp_path):
+    """One drive along a row of pixels; the plan has no EIRP."""
+    folder = export("HD{}_RSRP")
+    rasters = open_rasters(own_world.rasters)
+    lattice, level = rasters.lattice, rasters.read(cells=("A",))[0]
+    col = np.arange(lattice.cols)
+    lon, lat = unproject(lattice.crs, *lattice.east_north(np.full(lattice.cols, 20), col))
+    rows = [f"A,{lat[i]:.7f},{lon[i]:.7f},{level[20, i] + 3:.2f},{2 * i}\n" for i in col]
+    drive = tmp_path / "drive.csv"
+    drive.write_text("cell,lat,lon,level_dbm,time\n" + "".join(rows))
+    plan = read_cell_plan(own_world.plan, lattice.crs)
+    cells = tmp_path / "cells.csv"
+    cells.write_text(
+        "cell,site,lat,lon,height_m,azimuth_deg,frequency_mhz\n"
+        + "".join(f"{c.id},{c.site},{lat[0]},{lon[0]},20,0,1800\n" for c in plan.cells)
+    )
+    more = settings(
+        cells__plan=cells,
+        cells__eirp_dbm=43.0,
+        prediction__model="survey",
+        prediction__survey__files=drive,
+        prediction__survey__calibrate=folder,
+        prediction__survey__fill="true",
+        rasters__path=tmp_path / "made.tif",
+    )
+    done = assert_done(mapfilter("predict", "-c", own_world.toml, "--json", *more)).json
+    assert done["notes"][:2] == [
+        "rasters named HD*_RSRP, where * is a cell of the plan",
+        "eirp_dbm = 43 for 3 of 3 cells without one",
+    ]
+    off_db = open_rasters(tmp_path / "made.tif").read(cells=("A",))[0] - level
+    assert np.abs(off_db[20] - 3).max() < 1
 
 
 def test_names_that_do_not_fit_are_left_alone(export, own_world):

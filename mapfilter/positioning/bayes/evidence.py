@@ -198,8 +198,8 @@ class EvidenceUpdate(NamedTuple):
     reports only. Beliefs in which the phone was turned are weighed by ``rival_terms``, too.
     ``path`` is the way that a belief starts with, where the map alone is the
     evidence. ``contradiction`` is a way by fixes that the belief rejects. ``refuted`` is whether a
-    position is where none of the hypotheses of a search is that spread without any motion: it
-    begins anew.
+    position is where none of the hypotheses of a search is that spread without any motion, or none
+    is left: it begins anew.
     """
 
     state: Any

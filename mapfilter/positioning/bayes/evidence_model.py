@@ -133,9 +133,10 @@ class EvidenceModel:
                 if counted is not None:
                     share = self.evidence.levels.tracking_share
                     counted_unknown = reading.radio_under_null(share * other)
-                    held = counted[beyond] - before
+                    held = gained(before, counted[beyond], 1.0)
                     counted[beyond] = before + beyond_edge(odds, held, counted_unknown).gained
-                at_edge = beyond_edge(odds, log_weight[beyond] - before, unknown)
+                held = gained(before, log_weight[beyond], 1.0)
+                at_edge = beyond_edge(odds, held, unknown)
                 log_weight[beyond] = before + at_edge.gained
                 memory.keep_beyond_odds(kept.now, beyond, at_edge.log_odds)
         for term in reading.terms:

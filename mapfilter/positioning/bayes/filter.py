@@ -40,7 +40,7 @@ from mapfilter.positioning.bayes.usable import usable_epoch
 from mapfilter.positioning.bayes.warm_up import run_kernels
 from mapfilter.positioning.bayes.weighing import Weighing
 from mapfilter.positioning.epoch_checks import check_epoch
-from mapfilter.positioning.epochs import Epoch
+from mapfilter.positioning.epochs import Epoch, serving_cell
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.source import FirstFix, GnssSource
@@ -235,7 +235,7 @@ class BayesPositioner(Filter[BayesState]):
         if gnss.was_used(epoch.time_s):
             state = replace(state, watch=state.watch.positioned(epoch.time_s))
         if reason not in _TOLD_ELSEWHERE:
-            cell = next((str(row.cell) for row in epoch.radio if row.cell is not None), "")
+            cell = serving_cell(epoch) or ""
             unused.append(UnusedReading(epoch.time_s, "serving", cell, reason))
         return step_output(
             self.area, state, epoch.time_s, reason, tuple(unused), positions_only=self.scored

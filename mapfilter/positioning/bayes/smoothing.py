@@ -27,7 +27,7 @@ from mapfilter.models.street_motion import (
     TURN,
     MotionErrors,
 )
-from mapfilter.positioning.bayes.alternative import MapBelief
+from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.estimate import TrackEstimate
@@ -91,6 +91,8 @@ class BayesSmoother:
         since_m = after.alone_from_m
         led = isfinite(since_m) and since_m != before.alone_from_m
         unit = after.hold.step_unit_m / before.hold.step_unit_m
+        if self._is_another(before.alternative, after.alternative):
+            self.alternative, self.alternative_is_whole = [], True
         if taken_over and unit != 1.0:
             self._read_in_another_unit(unit)
         elif taken_over and (held_anew or led):
@@ -119,6 +121,11 @@ class BayesSmoother:
             self._keep_only(self.kept[::2])
             self.every_m *= 2
 
+    @staticmethod
+    def _is_another(one: AlternativeHypothesis | None, other: AlternativeHypothesis | None) -> bool:
+        """Return whether an alternative has been begun in place of one that reads otherwise."""
+        return one is not None and other is not None and one.start_m != other.start_m
+
     def _append(self, to: list[Kept], belief: MapBelief) -> None:
         """Keep a belief, unless all mass of its grid has left the area."""
         one = self._keep(belief)
@@ -142,7 +149,7 @@ class BayesSmoother:
         lengthened = end - scale * (end - np.array(self.moved))
         self.moved = [(float(e), float(n), float(s), float(v)) for e, n, s, v in lengthened]
         self._keep_only([self._moved_as(k) for k in self.alternative])
-        self.alternative = []
+        self.alternative, self.alternative_is_whole = [], True
 
     def _moved_as(self, kept: Kept) -> Kept:
         east_m, north_m, travelled_m, sampling_m2 = self.moved[kept.epoch]

@@ -52,7 +52,7 @@ def read_fingerprint_table(path: Path | str, crs: str | None = None) -> Reports:
     Columns ``east_m, north_m`` (or ``x, y``) hold metres, ``lon, lat`` (or ``longitude, latitude``)
     degrees, or metres where they cannot be degrees; metres are used where a table has both. Columns
     such as ``floor`` and ``userid`` are not used; all others are transmitters. Levels that are none
-    are left out and counted.
+    are left out and counted. Decimal commas are read where they separate nothing.
 
     Parameters
     ----------
@@ -74,18 +74,18 @@ def read_fingerprint_table(path: Path | str, crs: str | None = None) -> Reports:
         keywords=[Setting("crs", crs, str | None)],
     )
     path = Path(path)
-    table, notes = _read(path)
+    table, separator, notes = _read(path)
     names = {name: str(name).strip() for name in table.columns}
     lower = {text.lower(): name for name, text in names.items()}
     used = next((p for p in (*_METRES, *_DEGREES) if set(p) <= lower.keys()), None)
     places = np.full((len(table), 2), np.nan)
     if used is not None:
-        places = np.column_stack([_numbers(table[lower[name]]) for name in used])
+        places = np.column_stack([_numbers(table[lower[name]], separator) for name in used])
     cells = [name for text, name in lower.items() if text not in _PLACES | _OTHER]
     if not cells:
         expected = "a column for each transmitter"
         raise fail(InputError, f"{path}, header", expected, listed(list(names.values())))
-    levels = np.column_stack([_numbers(table[name]) for name in cells])
+    levels = np.column_stack([_numbers(table[name], separator) for name in cells])
     crs, places = _projected(path, crs, places, degrees=used in _DEGREES, known=used is not None)
     received = np.isfinite(levels) & (levels != NOT_RECEIVED_DBM)
     levels, received, odd = _checked(levels, received)
@@ -109,7 +109,8 @@ def read_fingerprint_table(path: Path | str, crs: str | None = None) -> Reports:
     )
 
 
-def _read(path: Path) -> tuple[pd.DataFrame, list[str]]:
+def _read(path: Path) -> tuple[pd.DataFrame, str, list[str]]:
+    """Return a table, what separates its fields, and notes."""
     expected = "a table with a header line"
     data = read_input(path, _LARGEST_BYTES, "a table")
     data, notes = without_cut_end(data, _SEPARATORS, path.name)
@@ -135,7 +136,7 @@ def _read(path: Path) -> tuple[pd.DataFrame, list[str]]:
     except (ValueError, pd.errors.ParserError, pd.errors.ParserWarning) as error:
         got = str(error).splitlines()[0]
         raise fail(InputError, str(path), expected, got, "cut off, or no text") from error
-    return table, notes
+    return table, separator, notes
 
 
 def _fields(line: str, separator: str) -> list[str]:
@@ -147,9 +148,11 @@ def _fields(line: str, separator: str) -> list[str]:
         return line.split(separator)
 
 
-def _numbers(column: pd.Series) -> Floats:
+def _numbers(column: pd.Series, separator: str) -> Floats:
     if pd.api.types.is_bool_dtype(column.dtype):
         return np.full(len(column), np.nan)
+    if separator != "," and not pd.api.types.is_numeric_dtype(column.dtype):
+        column = column.astype(str).str.replace(",", ".", regex=False)
     try:
         numbers = pd.to_numeric(column, errors="coerce")
     except OverflowError:

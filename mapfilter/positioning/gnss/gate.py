@@ -140,6 +140,11 @@ class GnssGate:
         if found.state.probation_until_s > epoch.time_s:
             # Where fixes are rejected, pseudoranges are not used alone, and the other way around.
             found = found._replace(terms=(FixedTerm(np.zeros(1)),), under_null=0.0)
+            if by_fix:
+                unused = replace(
+                    found.state, fix_used_at_m=state.fix_used_at_m, excess=state.excess
+                )
+                found = found.without("gnss", [""], Reason.ON_PROBATION, state=unused)
         return found
 
     def _gate(self, belief: MapBelief) -> float:

@@ -187,7 +187,9 @@ class GnssSource(EvidenceSource):
             rival_terms=main.rival_terms,
             disputed=disputed or astray or contradiction is not None,
             contradiction=contradiction,
-            refuted=astray and belief.status is Status.SEARCHING,
+            refuted=(astray and belief.status is Status.SEARCHING)
+            # Nothing is left of a grid's belief beyond the area.
+            or (epoch.fix is not None and not belief.count),
         )
 
     def _weighted(self, found: Contradiction | None, *, proven: bool) -> Contradiction | None:

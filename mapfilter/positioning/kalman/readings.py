@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from math import inf, isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -28,18 +28,22 @@ class SiteReadings(NamedTuple):
 def site_readings(sites: SiteModels, epoch: Epoch) -> SiteReadings:
     """Return the readings of an epoch's report.
 
+    The serving cell comes first, then its neighbours from the strongest down: a filter begins at
+    the first one, and has room for the errors of only so many.
+
     A row without a cell identity is assigned to the cell of the plan with its carrier and BSIC,
     near the serving cell; where there are several, it is left out.
     """
+    rows = sorted(epoch.radio, key=_rank)
     timed = {
         row.cell: int(row.timing_advance)
-        for row in epoch.radio
+        for row in rows
         if row.cell is not None and isfinite(row.timing_advance)
     }
-    serving = next((row.cell for row in epoch.radio if row.role == SERVING and row.cell), None)
+    serving = next((row.cell for row in rows if row.role == SERVING and row.cell), None)
     received: list[tuple[str, float]] = []
     unused: list[UnusedReading] = []
-    for row in epoch.radio:
+    for row in rows:
         name, reason = _cell(sites, row, serving)
         level = isfinite(row.level_dbm) and row.censored == 0
         if name is not None and level:
@@ -50,6 +54,13 @@ def site_readings(sites: SiteModels, epoch: Epoch) -> SiteReadings:
     known = {name: steps for name, steps in timed.items() if name in sites.cells}
     cells, levels_dbm = tuple(name for name, _ in received), tuple(level for _, level in received)
     return SiteReadings(cells, levels_dbm, tuple(known), tuple(known.values()), tuple(unused))
+
+
+def _rank(row: ReportRow) -> tuple[bool, float]:
+    """Return what the rows of a report are sorted by."""
+    if row.role == SERVING:
+        return False, 0.0
+    return True, -row.level_dbm if isfinite(row.level_dbm) else inf
 
 
 def _cell(sites: SiteModels, row: ReportRow, serving: str | None) -> tuple[str | None, Reason]:

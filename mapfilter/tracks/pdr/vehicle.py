@@ -163,6 +163,8 @@ def _driven(signals: Signals, rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNois
     heading = yaw + np.interp(time_s, found.time_s, found.offset_rad)
     lasted_s = np.diff(time_s)
     step = np.concatenate([[0.0], lasted_s * (speed[1:] + speed[:-1]) / 2])
+    # Over a rest a speed is noise, which would be that of the whole pause.
+    step[long_gaps(time_s)] = 0.0
     step[odometry_gaps(time_s, speed)] = np.nan
     middle = np.concatenate([heading[:1], (heading[1:] + heading[:-1]) / 2])
     motion = pd.DataFrame(

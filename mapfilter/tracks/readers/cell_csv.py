@@ -14,6 +14,7 @@ from mapfilter.radio.identities import technology
 from mapfilter.tracks.readers.columns import Columns, changed_rows, only
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.identities import add_radio, available
+from mapfilter.tracks.readers.plain_csv import has_content
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.separated_values import header_columns, header_names, likely_separator
@@ -162,7 +163,9 @@ def _is_cell_list(text: Text) -> bool:
     names = _names(text)
     new = {"radio", "mcc", "net", "area", "cell", "lat", "lon"} <= names
     old = {"mcc", "mnc", "lac", "cellid", "lat", "lon"} <= names
-    return (new or old) and bool({"samples", "nbsamples", "averagesignal", "range"} & names)
+    counted = bool({"samples", "nbsamples", "averagesignal", "range"} & names)
+    # With times it is a journey.
+    return (new or old) and counted and not has_content([*names])
 
 
 def _read_cell_list(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001

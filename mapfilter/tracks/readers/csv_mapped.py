@@ -24,7 +24,9 @@ _DIRECTIONS = (
     *("compass_deg", "heading_rad", "turn_rad", "turn_deg"),
     *("yaw_rate_radps", "yaw_rate_degps"),
 )
-_SIGNALS = ("signal", "signal_strength", "signal strength", "signalstrength", "strength")
+SIGNALS = ("signal", "signal_strength", "signal strength", "signalstrength", "strength")
+"""Columns that may hold levels, by their values, beside those of :data:`NAMED_CELLS`."""
+NAMED_CELLS = ("ci", "cell", "cgi")
 _USUAL_DBM, _MOSTLY = (-150.0, -20.0), 0.9
 _OF_CELLS = ("cell_id", "cellid")
 _DECIMAL = re.compile(r"-?[0-9]{1,20}(\.0*)?|0x[0-9a-f]{1,9}", re.ASCII | re.IGNORECASE)
@@ -219,8 +221,8 @@ def _with_signals(mapped: Mapped, reading: Reading) -> Mapped:
 
     By their values they may also be bars, ASU, or per cent.
     """
-    name = mapped.rows.find(*_SIGNALS)
-    if name is None or mapped.has("level_dbm") or not any(map(mapped.has, ("ci", "cell", "cgi"))):
+    name = mapped.rows.find(*SIGNALS)
+    if name is None or mapped.has("level_dbm") or not any(map(mapped.has, NAMED_CELLS)):
         return mapped
     if name in {column.lower() for column in mapped.own.values()}:
         return mapped

@@ -65,6 +65,8 @@ FORMATS: tuple[Format, ...] = (
 )
 """All formats, in the order in which a file is compared with them."""
 
+_BY_NAMES = (plain_csv.FORMAT, long_tables.FORMAT)
+_TOLD_BY_LITTLE = (phone_sensors.PHYPHOX, poses.KITTI, poses.TUM)
 _PEEKED_BYTES = 1 << 18
 
 
@@ -136,6 +138,8 @@ def read_recording(
         raise unknown_format(path, text, find_format)
     reading = Reading(path, notes=list(text.notes))
     options = options or ReadOptions()
+    if own and known not in _BY_NAMES and not options.shared:
+        reading.note(f"names of columns (--column) have no effect: this is {known.title}")
     try:
         # Numbers of any size occur in damaged files; what comes of them is checked in the end.
         with np.errstate(all="ignore"):
@@ -170,9 +174,13 @@ def _below_title(text: Text, options: ReadOptions | None) -> Text | None:
 
 def _is_chosen(known: Format, text: Text, options: ReadOptions | None) -> bool:
     """Return whether a column map takes the columns of a file of some format as they are."""
-    if known is long_tables.FORMAT and options is not None:
+    if options is None or known is None:
+        return False
+    if known is long_tables.FORMAT:
         return long_tables.has_columns_of(text, options.columns.values())
-    return known is tems.FORMAT and _named(text, options)
+    # Formats that are told by little: a map that names more than times knows better.
+    chosen = known is tems.FORMAT or (known in _TOLD_BY_LITTLE and {*options.columns} != {"time"})
+    return chosen and _named(text, options)
 
 
 def _named(text: Text, options: ReadOptions | None) -> bool:

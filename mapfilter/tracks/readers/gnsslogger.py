@@ -13,9 +13,10 @@ from mapfilter.gnss.almanacs import WEEK_S
 from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.lines import blocks
+from mapfilter.tracks.readers.plain_csv import has_content
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.separated_values import line_columns
+from mapfilter.tracks.readers.separated_values import header_names, line_columns
 from mapfilter.tracks.readers.text import Text
 from mapfilter.tracks.readers.times import unix_seconds, utc_from_gps_s
 
@@ -46,6 +47,9 @@ _AXES = ("x", "y", "z")
 
 
 def _matches(text: Text) -> bool:
+    if has_content(header_names(text.first_line, ",")):
+        # A table may have a column of such a name.
+        return False
     starts = [line.lstrip("# ").split(",", 1)[0] for line in text.head[:400]]
     return any(
         start in ("Fix", "Raw") and line.count(",") >= 6

@@ -51,8 +51,10 @@ from mapfilter.tracks.readers.nemo_identities import (
     nothing_known,
     of_systems,
 )
+from mapfilter.tracks.readers.plain_csv import has_content
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
+from mapfilter.tracks.readers.separated_values import header_names, likely_separator
 from mapfilter.tracks.readers.text import Text
 
 _BEGIN = re.compile(r"#(?:PRODUCT|FF|ID|START)[,;\t]")
@@ -88,6 +90,9 @@ _SYSTEMS = {
 
 
 def _matches(text: Text) -> bool:
+    if has_content(header_names(text.first_line, likely_separator(text.first_line))):
+        # A table may have a column of such a name.
+        return False
     lines = [line.lstrip() for line in text.head[:200]]
     return any(_BEGIN.match(line) or _EVENT.match(line) for line in lines)
 
@@ -104,7 +109,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     midnight_s = _midnight_s(head)
     ahead_s = _ahead_s(head)
     zone = options.zone if ahead_s is None else ""
-    reading.clock = Clock("monotonic")
+    reading.clock = Clock("monotonic", from_midnight=True)
     if midnight_s is None:
         reading.note("no date in #START: times count from an unknown day")
     elif ahead_s is None:

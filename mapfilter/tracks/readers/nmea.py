@@ -61,11 +61,12 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: 
             reading.note("dates are those of the time stamps before the sentences")
     if dates.empty:
         reading.note("no date in the file (neither RMC nor ZDA): times count from a midnight")
-        reading.clock = Clock("monotonic")
+        reading.clock = Clock("monotonic", from_midnight=True)
     known = tables[b"GGA"], tables[b"RMC"]
     parts = [_gga(known[0], dates, reading), _rmc(known[1], dates, reading)]
     rows = pd.concat(parts, ignore_index=True)
     rows = rows[rows["valid"]].sort_values("line", kind="stable")
+    reading.refuse(rows["line"][rows["time_s"].isna()], "positions: no usable time")
     if rows.empty:
         return
     first = rows.groupby("time_s", sort=True).first().reset_index()

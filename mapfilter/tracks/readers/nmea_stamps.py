@@ -9,7 +9,7 @@ import pandas as pd
 
 from mapfilter._types import Floats, Ints
 
-_MOST_LINES = 1000
+_MOST_LINES, _PAUSE_S = 1000, 60.0
 _DAY_S = 86_400.0
 _DATE = re.compile(
     rb"(\d{4})[-/](\d\d)[-/](\d\d)[T ,;]{1,2}(\d\d):(\d\d):(\d\d)(?:[.,]\d+)?(Z|[+-]\d\d:?\d\d)?"
@@ -46,7 +46,11 @@ def stamped_dates(data: bytes, line: Ints, of_day_s: Floats) -> pd.DataFrame:
     ['2024-05-01']
     """
     some = np.flatnonzero(np.isfinite(of_day_s))
-    some = some[:: max(1, some.size // _MOST_LINES)]
+    paused = np.abs(np.diff(of_day_s[some])) > _PAUSE_S
+    # Sentences beside a pause, too, as those after it may be of another day.
+    told = np.append(paused, False) | np.append(False, paused)[: some.size]
+    told[:: max(1, some.size // _MOST_LINES)] = True
+    some = some[told]
     begins = np.append(0, np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == 10) + 1)
     stamps = np.array([_stamp_s(data, int(begins[k - 1])) for k in line[some].tolist()])
     midnight_s = _DAY_S * np.round((stamps - of_day_s[some]) / _DAY_S)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,8 @@ import numpy as np
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.tracks.readers.columns import Columns
+from mapfilter.tracks.readers.csv_fields import usual_fields
+from mapfilter.tracks.readers.csv_headers import stated_fields
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
@@ -30,6 +33,12 @@ _UNITS = {
 _UNIT = re.compile(r"\(([^()]*)\)\s*$")
 _PHYPHOX_WORDS = ("m/s", "rad/s", "t)", "hpa", "latitude")
 """Units and names of the sensors that are read, in the headers of their files."""
+_OF_POSITIONS = {
+    **dict.fromkeys(("lat_deg", "lon_deg", "course_deg"), ")"),
+    **dict.fromkeys(("altitude_m", "accuracy_m"), "(m)"),
+    "speed_mps": "(m/s)",
+}
+"""Fields of positions, and how the names of their columns end."""
 _EARTH_MPS2, _EARTH_UT = (8.5, 11.5), (15.0, 90.0)
 _KILOPASCAL = (30.0, 110.0)
 _SENSOR_LOGGER = {
@@ -53,7 +62,28 @@ def _is_phyphox(text: Text) -> bool:
     if len(names) < 2 or names[0] != "time (s)" or not all("(" in name for name in names[1:]):
         return False
     # An export also has files of light, sound and other sensors that are not read.
-    return any(word in name for name in names[1:] for word in _PHYPHOX_WORDS)
+    if not any(word in name for name in names[1:] for word in _PHYPHOX_WORDS):
+        return False
+    columns = {**usual_fields(names), **stated_fields(names, (), ())}
+    fields = columns.keys() - {"time"}
+    if {"lat_deg", "lon_deg"} <= fields <= _OF_POSITIONS.keys():
+        units = ((columns[field], unit) for field, unit in _OF_POSITIONS.items() if field in fields)
+        return all(name.endswith(unit) for name, unit in units)
+    # Others are columns of a table of several sensors, or of a vehicle.
+    axes = {name[:-1] for name in fields if name[-2:] in ("_x", "_y", "_z")}
+    one = len(axes) == 1 and len(fields) == len(_AXES) and len(_axes_of(_bare(names))) == len(_AXES)
+    return not fields or one or fields == {"pressure_hpa"}
+
+
+def _bare(names: Sequence[str]) -> list[str]:
+    """Return names without their units."""
+    return [_UNIT.sub("", name).strip() for name in names]
+
+
+def _axes_of(names: Sequence[str]) -> dict[str, str]:
+    """Return the names of the axes x, y and z, which are or end with these."""
+    found = {axis: next((n for n in names if n.split()[-1:] == [axis]), "") for axis in _AXES}
+    return {axis: name for axis, name in found.items() if name}
 
 
 def _read_phyphox(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
@@ -92,8 +122,8 @@ def _add_axes(
     rows: Columns, reading: Reading, sensor: str, time_s: Floats, names: list[str]
 ) -> None:
     """Add a sensor of three axes, whose names are or end with x, y and z."""
-    axes = {axis: next((n for n in names if n.split()[-1:] == [axis]), "") for axis in _AXES}
-    if not (sensor and all(axes.values())):
+    axes = _axes_of(names)
+    if not (sensor and len(axes) == len(_AXES)):
         expected = "axes x, y and z of an accelerometer, gyroscope or magnetometer, or a pressure"
         raise fail(InputError, f"{reading.path} header", expected, ", ".join(names)[:100])
     columns = {f"{axis}_{_UNITS[sensor]}": rows.number(axes[axis]) for axis in _AXES}

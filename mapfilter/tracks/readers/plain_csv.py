@@ -15,7 +15,14 @@ from mapfilter.tracks.readers.csv_attitude import add_attitude
 from mapfilter.tracks.readers.csv_cells import add_cells
 from mapfilter.tracks.readers.csv_fields import FIELDS, usual_fields
 from mapfilter.tracks.readers.csv_headers import stated_fields
-from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows, mapped_columns, with_dates
+from mapfilter.tracks.readers.csv_mapped import (
+    NAMED_CELLS,
+    SIGNALS,
+    Mapped,
+    add_rows,
+    mapped_columns,
+    with_dates,
+)
 from mapfilter.tracks.readers.csv_odometry import add_odometry, add_turns
 from mapfilter.tracks.readers.csv_places import add_places, hemisphere_columns
 from mapfilter.tracks.readers.csv_steps import add_steps, are_counted
@@ -69,6 +76,8 @@ def has_content(names: Sequence[str]) -> bool:
     """Return whether columns of these names make rows of a journey: times, and what was there."""
     names = full_names(names)
     found = {*usual_fields(names), *stated_fields(names, (), ())}
+    if found.intersection(NAMED_CELLS) and not {*SIGNALS}.isdisjoint(names):
+        found.add("level_dbm")
     return "time" in found and any(found.issuperset(fields) for fields in _CONTENT)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -12,16 +12,24 @@ import numpy as np
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import MapfilterError
 from mapfilter.tracks.readers.columns import Columns
+from mapfilter.tracks.readers.csv_fields import usual_fields
+from mapfilter.tracks.readers.csv_headers import stated_fields
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.lines import blocks
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.separated_values import split_blanks, value_columns
+from mapfilter.tracks.readers.separated_values import (
+    header_names,
+    likely_separator,
+    split_blanks,
+    value_columns,
+)
 from mapfilter.tracks.readers.text import Text, read_text
 from mapfilter.tracks.readers.times import LEAST_UNIX_S
 from mapfilter.tracks.readers.zipped import has_recording
 
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d{1,3})?|[-+]?(nan|inf)", re.IGNORECASE)
+_PLACE = re.compile(r"(t|p|pos|position)?[_ .]?x([_ ]?m| ?[\[(].*)?")
 _FRAME_S = 0.1
 _CROOKED = 0.05
 
@@ -29,40 +37,74 @@ _CROOKED = 0.05
 _NAMES = frozenset(
     ["x", "y", "z", "tx", "ty", "tz", "qx", "qy", "qz", "qw", "x_m", "y_m", "z_m", "r11", "r00"]
 )
+_OF_POSES = frozenset(["time", "qx", "qy", "qz", "qw"])
 
 
-def _count(text: Text, count: int) -> bool:
-    lines = [line for line in text.head[:30] if line.strip() and not line.startswith("#")][:20]
-    right = sum(_numbers(line, count) for line in lines)
-    return bool(lines) and right > 0.5 * len(lines) and not _names_others(lines[0])
+def _count(text: Text, count: int, is_pose: Callable[[Floats], bool]) -> bool:
+    """Return whether most lines have so many numbers and, where the first has others, are poses."""
+    lines = _body(text)
+    rows = [numbers for line in lines if (numbers := _numbers(line, count)) is not None]
+    if len(rows) <= 0.5 * len(lines) or _names_others(lines[0]):
+        return False
+    # A table of as many other numbers has a header.
+    return _numbers(text.first_line, count) is not None or any(map(is_pose, rows))
+
+
+def _body(text: Text) -> list[str]:
+    return [line for line in text.head[:30] if line.strip() and not line.startswith("#")][:20]
 
 
 def _names_others(line: str) -> bool:
-    """Return whether a header names columns none of which is of a pose."""
+    """Return whether a header names columns none of which is of a pose, or fields of a plain CSV.
+
+    Attitudes are of both.
+    """
     words = {word.strip().lower() for word in re.split(r"[,;\s]+", line) if word.strip()}
-    return bool(words) and all(word[0].isalpha() for word in words) and not words & _NAMES
+    if words and all(word[0].isalpha() for word in words) and not words & _NAMES:
+        return True
+    names = header_names(line, likely_separator(line))
+    return bool({*usual_fields(names), *stated_fields(names, (), ())} - _OF_POSES)
 
 
-def _numbers(line: str, count: int) -> bool:
-    """Return whether a line has so many numbers; commas separate, or are decimal ones."""
-    return any(
-        len(words) == count and all(map(_NUMBER.fullmatch, words))
-        for words in (line.replace(",", other).replace(";", " ").split() for other in " .")
-    )
+def _numbers(line: str, count: int) -> Floats | None:
+    """Return the numbers of a line with so many; commas separate, or are decimal ones."""
+    for other in " .":
+        words = line.replace(",", other).replace(";", " ").split()
+        if len(words) == count and all(map(_NUMBER.fullmatch, words)):
+            return np.array(words, dtype=float)
+    return None
+
+
+def _has_quaternion(row: Floats) -> bool:
+    return bool(abs(np.linalg.norm(row[4:]) - 1.0) <= _CROOKED)
+
+
+def _has_rotation(row: Floats) -> bool:
+    lengths = np.linalg.norm(row.reshape(3, 4)[:, :3], axis=1)
+    return bool((np.abs(lengths - 1.0) <= _CROOKED).all())
 
 
 def _comma(text: Text, count: int) -> bytes:
     """Return what a comma stands for: a blank, or a decimal point."""
     lines = (line.replace(",", ".").replace(";", " ") for line in text.head[:30] if "," in line)
-    return b"." if any(_numbers(line, count) for line in lines) else b" "
+    return b"." if any(_numbers(line, count) is not None for line in lines) else b" "
 
 
 def _is_kitti(text: Text) -> bool:
-    return _count(text, 12)
+    return _count(text, 12, _has_rotation)
 
 
 def _is_tum(text: Text) -> bool:
-    return _count(text, 8)
+    return _count(text, 8, _has_quaternion) and _names_place(_body(text)[0])
+
+
+def _names_place(line: str) -> bool:
+    """Return whether a line is no header, or its second column one of positions."""
+    if _numbers(line, 8) is not None:
+        return True
+    separator = likely_separator(line)
+    names = line.split(separator) if separator in line else line.split()
+    return bool(_PLACE.fullmatch(names[min(1, len(names) - 1)].strip(' "').lower()))
 
 
 def _parts(
@@ -84,7 +126,8 @@ def _read_kitti(text: Text, reading: Reading, options: ReadOptions) -> None:  # 
 
     reading.program, reading.clock = "KITTI poses", Clock("monotonic")
     names = [f"r{i}{j}" for i in range(3) for j in range(4)]
-    times = _frame_times(text, reading)
+    comments = _comments(text.data)
+    times = _frame_times(text, reading, comments.size)
     for rows, values in _parts(text, reading, names):
         matrix = np.stack([values[name] for name in names], axis=1).reshape(-1, 3, 4)
         turn = matrix[:, :, :3]
@@ -96,12 +139,19 @@ def _read_kitti(text: Text, reading: Reading, options: ReadOptions) -> None:  # 
         reading.refuse(rows.line[~good], "pose: no rotation matrix")
         if good.any():
             quaternion = Rotation.from_matrix(turn[good]).as_quat()
-            frame = rows.line[good] - 1
+            frame = rows.line[good] - 1 - np.searchsorted(comments, rows.line[good])
             time_s = _FRAME_S * frame if times is None else times[frame]
             _add_poses(reading, time_s, matrix[good][:, :, 3], quaternion, rows.line[good])
 
 
-def _frame_times(text: Text, reading: Reading) -> Floats | None:
+def _comments(data: bytes) -> Ints:
+    """Return the numbers of lines that are comments."""
+    begins = [found.start() for found in re.finditer(rb"^[ \t]*#", data, re.MULTILINE)]
+    feeds = np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == ord("\n"))
+    return np.searchsorted(feeds, begins) + 1
+
+
+def _frame_times(text: Text, reading: Reading, comments: int) -> Floats | None:
     """Return times by ``times.txt`` beside the file, as in KITTI's odometry; None without it."""
     path = Path(reading.path).parent / "times.txt"
     if has_recording(path):
@@ -109,7 +159,7 @@ def _frame_times(text: Text, reading: Reading) -> Floats | None:
             aside = Reading(path)
             rows = value_columns(memoryview(split_blanks(read_text(path).data)), aside, ["t"], " ")
             times = rows.number("t")
-            if len(times) > text.data.rstrip().count(b"\n"):
+            if len(times) > text.data.rstrip().count(b"\n") - comments:
                 reading.note("times by times.txt")
                 return np.asarray(times)
         except MapfilterError:

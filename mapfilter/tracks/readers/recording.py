@@ -26,10 +26,13 @@ class Clock:
         an unknown start.
     zone : str
         Zone by which local times were turned into UTC; "" where unknown.
+    from_midnight : bool
+        Whether the unknown start of ``monotonic`` ones is a midnight.
     """
 
     kind: ClockKind
     zone: str = ""
+    from_midnight: bool = False
 
     @property
     def absolute(self) -> bool:

@@ -34,6 +34,7 @@ from mapfilter._types import Bools, Floats
 from mapfilter.tracks.readers.columns import Columns, only
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.identities import add_radio, available
+from mapfilter.tracks.readers.plain_csv import has_content
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
 from mapfilter.tracks.readers.separated_values import header_columns, header_names, likely_separator
@@ -71,9 +72,10 @@ _LTE_NEIGHBOUR = {
     "level": "neighbor cell rsrp (dbm)",
 }
 _LTE_AGGREGATED = {field: _LTE[field] for field in ("arfcn", "bsic", "level")}
-_MARKS = {"ms", "eq", "message type"}
+_TITLE, _DEVICES = "message type", {"ms", "eq"}
 _ELEMENTS = {*_LAT, *_LON, *_GSM.values(), *_GSM_NEIGHBOUR.values(), *_LTE.values()}
 _ELEMENTS_OF_CELLS = _ELEMENTS - {*_LAT, *_LON} | set(_LTE_NEIGHBOUR.values())
+_LEVELS = {name for name in _ELEMENTS if "(dbm)" in name}
 _MOST_LISTED = 32
 _CELLS_OF_ENB = 256
 _RENEWED_S = 1.0
@@ -106,7 +108,9 @@ def _matches(text: Text) -> bool:
     names = header_names(text.first_line, likely_separator(text.first_line))
     plain = {_plain(name) for name in names}
     elements = {name.partition("[")[0] for name in plain} & _ELEMENTS
-    exported = bool(plain & _MARKS) or any(name.startswith("all-") for name in names)
+    exported = _TITLE in plain or any(name.startswith("all-") for name in names)
+    # A column "ms" may be of milliseconds.
+    exported |= bool(plain & _DEVICES) and (bool(elements & _LEVELS) or not has_content(names))
     return exported and bool(plain & set(_TIMES)) and len(elements - {"latitude", "longitude"}) > 0
 
 
@@ -134,7 +138,7 @@ def _times(rows: Columns, reading: Reading, options: ReadOptions) -> Floats:
         return np.zeros(0)
     day_s = rows.seconds_of_day(*_TIMES)
     if np.isfinite(day_s).sum() > 0.5 * (rows.texts(*_TIMES) != "").sum():
-        reading.clock = Clock("monotonic")
+        reading.clock = Clock("monotonic", from_midnight=True)
         reading.note("times of day without a date: they count from an unknown day")
         before_s = max((p[-1]["time_s"].iloc[-1] for p in reading.tables.values()), default=np.nan)
         return without_midnights(day_s, float(before_s))

@@ -44,7 +44,9 @@
         predicted: one.predicted_dbm ?? NaN, reason: one.use, used: one.use === "used", censored: one.censored ?? 0 }));
       came += 1;
       const values = { came, number: fix.number, time: fix.time_s, east: fix.east_m - west, north: fix.north_m - south, status: bundle.statuses.indexOf(fix.status),
-        reason: bundle.reasons.indexOf(fix.reason), r50: fix.radius_50_m, r95: fix.radius_95_m, r99: fix.radius_99_m, protection: fix.protection_m,
+        reason: bundle.reasons.indexOf(fix.reason), r50: fix.radius_50_m, r95: fix.radius_95_m, r99: fix.radius_99_m,
+        // JSON has no infinity: a level that is missing beside radii is infinite.
+        protection: fix.protection_m ?? (Number.isFinite(fix.radius_99_m) ? Infinity : NaN),
         mass: fix.mass_50m, entropy: fix.entropy_bits, log_evidence: fix.log_evidence, hypotheses: fix.hypotheses,
         runner_east: fix.runner_up_east_m - west, runner_north: fix.runner_up_north_m - south, runner_mass: fix.runner_up_mass,
         way: ways.get(String(fix.way_id)) ?? 0, way_p: fix.way_probability, doubt: detail?.doubt, alt_east: other ? other.east_m - west : NaN,
