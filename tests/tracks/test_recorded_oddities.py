@@ -409,6 +409,9 @@ def test_times_of_day_in_one_number(read, monkeypatch, rows):
 def test_seconds_are_no_times_of_day_in_one_number(read, step):
     time = 100_000 + step * np.arange(COUNT)
     np.testing.assert_allclose(places(read(time=time, lat=LAT, lon=LON))["time_s"], time)
+    # Two runs of less than a minute.
+    time = np.append(np.arange(150) / 3, 50_000 + np.arange(150) / 3)
+    np.testing.assert_allclose(places(read(time=time, lat=LAT, lon=LON))["time_s"], time)
 
 
 @pytest.mark.parametrize("odd", ["", "-", "unknown"])

@@ -49,8 +49,8 @@ _EARLY_S, _RECENT_S, _LATEST_S = 9e8, 1.6e9, 2.2e9
 _SAME_DATE = "time: the date stays the same over midnight: times go on with the next day"
 _PAUSE_S = 600.0
 _OF_DAY = "time: taken for hours, minutes and seconds of the day in one number, as 101530"
-_LONG, _SHORT = 300.0, 20.0
-"""Of times, and of their usual steps, to tell them from seconds."""
+_LONG, _SHORT, _JUMP, _FEWEST_JUMPS = 300.0, 20.0, 40.0, 3
+"""Of times, their steps and the jumps between their minutes, to tell them from seconds."""
 _DAYS = "time: days since 1900, as a spreadsheet writes them"
 
 
@@ -155,7 +155,9 @@ def _without_digits(reading: Reading, number: Floats) -> Floats:
     if minutes.max() >= 60 or seconds.max() >= 60:
         return number
     steps = np.diff(np.unique(number[known]))
-    long = steps.sum() > _LONG and np.median(steps) <= _SHORT
+    # From one minute to the next such numbers jump by 40.
+    jumps = (steps > _JUMP) & (steps <= _JUMP + _SHORT)
+    long = steps[steps <= _JUMP + _SHORT].sum() > _LONG and jumps.sum() >= _FEWEST_JUMPS
     if not (long or _OF_DAY in reading.notes):
         return number
     reading.note(_OF_DAY)
