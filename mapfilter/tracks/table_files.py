@@ -28,6 +28,7 @@ _LARGEST_BYTES = 2 << 30
 _BLOCK_BYTES = 1 << 22
 _MOST_COLUMNS = 1000
 _DECIMAL_COMMA = r"^\s*([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)\s*$"
+"""A number that has a comma for a point."""
 
 
 class ReadTable(NamedTuple):

@@ -32,7 +32,7 @@ REASONS: Mapping[Reason, str] = {
     Reason.UPDATE_FAILED: "the filter's update failed",
     Reason.UNKNOWN_SATELLITE: "the satellite's place is unknown",
     Reason.BELOW_HORIZON: "the satellite is below the horizon",
-    Reason.SECOND_READING: "a second reading of the same satellite",
+    Reason.SECOND_READING: "a second reading of the same satellite or cell",
     Reason.REJECTED_BY_EVIDENCE: "contradicts the position that the other readings give",
     Reason.ON_PROBATION: "was wrong before, and has to agree for a while first",
     Reason.REPEATED_FIX: "the receiver repeats its last position",

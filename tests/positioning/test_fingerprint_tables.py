@@ -81,6 +81,7 @@ def test_a_table_without_positions_can_be_located(tmp_path):
         ("longitude,latitude,ap\n1,2,100\n", "levels in dBm"),
         ("longitude,latitude,ap\n1,2,55\n", "levels in dBm"),
         ("longitude,latitude,ap\n1,2,abc\n", "levels in dBm"),
+        (UJI.encode("utf-16"), "UTF-16 text"),
     ],
 )
 def test_what_is_no_table_is_named(tmp_path, text, expected):

@@ -121,3 +121,16 @@ def test_the_serving_cell_is_not_the_first_one_that_is_named():
     """Near the serving cell there is E; near the neighbour that stands before it F's namesake."""
     found = read(row("neighbour", "F"), row("serving", "A"), row("neighbour", None, -80.0, 12, 1))
     assert found.cells == ("A", "F", "E")
+
+
+def test_a_cell_that_is_reported_twice_counts_once():
+    """By its name, or by its carrier and code."""
+    found = read(row("serving", "A", -71.0, steps=2.0), row("neighbour", "B", -80.0),
+                 row("neighbour", "A", -75.0, steps=3.0),
+                 row("neighbour", None, -83.0, 11, 1))  # fmt: skip
+    assert (found.cells, found.levels_dbm) == (("A", "B"), (-71.0, -80.0))
+    assert (found.timed, found.steps) == (("A",), (2,))
+    assert reasons(found) == [
+        ("neighbour", "A", Reason.SECOND_READING),
+        ("neighbour", "ARFCN 11, BSIC 1", Reason.SECOND_READING),
+    ]

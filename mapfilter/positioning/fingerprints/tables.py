@@ -17,7 +17,7 @@ import pandas as pd
 from mapfilter._arguments import Setting, check_arguments, path_argument
 from mapfilter._crs_reach import likely_mistake, project_within
 from mapfilter._cut_ends import without_cut_end
-from mapfilter._inputs import read_input
+from mapfilter._inputs import read_input, wide_encoding
 from mapfilter._separator_line import without_separator_line
 from mapfilter._types import Bools, Floats
 from mapfilter._words import number_of
@@ -113,6 +113,9 @@ def _read(path: Path) -> tuple[pd.DataFrame, str, list[str]]:
     """Return a table, what separates its fields, and notes."""
     expected = "a table with a header line"
     data = read_input(path, _LARGEST_BYTES, "a table")
+    if wide := wide_encoding(data):
+        hint = "saved as Unicode; save as UTF-8"
+        raise fail(InputError, str(path), "text in UTF-8", f"{wide} text", hint)
     data, notes = without_cut_end(data, _SEPARATORS, path.name)
     text = data.decode("utf-8-sig", "replace")
     lines = [line for line in without_separator_line(text).splitlines() if line.strip()]

@@ -32,28 +32,30 @@ def site_readings(sites: SiteModels, epoch: Epoch) -> SiteReadings:
     the first one, and has room for the errors of only so many.
 
     A row without a cell identity is assigned to the cell of the plan with its carrier and BSIC,
-    near the serving cell; where there are several, it is left out.
+    near the serving cell; where there are several, it is left out. Of a cell that is reported twice
+    the first level and the first timing advance in that order count.
     """
     rows = sorted(epoch.radio, key=_rank)
-    timed = {
-        row.cell: int(row.timing_advance)
-        for row in rows
-        if row.cell is not None and isfinite(row.timing_advance)
-    }
+    timed: dict[str, int] = {}
+    for row in rows:
+        if row.cell is not None and isfinite(row.timing_advance):
+            timed.setdefault(row.cell, int(row.timing_advance))
     serving = next((row.cell for row in rows if row.role == SERVING and row.cell), None)
-    received: list[tuple[str, float]] = []
+    received: dict[str, float] = {}
     unused: list[UnusedReading] = []
     for row in rows:
         name, reason = _cell(sites, row, serving)
         level = isfinite(row.level_dbm) and row.censored == 0
-        if name is not None and level:
-            received.append((name, row.level_dbm))
+        if level and name in received:
+            unused.append(UnusedReading(epoch.time_s, row.role, row.name, Reason.SECOND_READING))
+        elif name is not None and level:
+            received[name] = row.level_dbm
         elif name is None or name not in timed:
             kind = SERVING if row.role == SERVING else NEIGHBOUR
             unused.append(UnusedReading(epoch.time_s, kind, row.name, reason))
     known = {name: steps for name, steps in timed.items() if name in sites.cells}
-    cells, levels_dbm = tuple(name for name, _ in received), tuple(level for _, level in received)
-    return SiteReadings(cells, levels_dbm, tuple(known), tuple(known.values()), tuple(unused))
+    levels = tuple(received), tuple(received.values())
+    return SiteReadings(*levels, tuple(known), tuple(known.values()), tuple(unused))
 
 
 def _rank(row: ReportRow) -> tuple[bool, float]:
