@@ -109,7 +109,7 @@ def test_hemispheres_of_a_receiver_without_a_fix_for_long(read):
     np.testing.assert_allclose(places(found)["lon_deg"], -LON)
 
 
-@pytest.mark.parametrize("mark", ["-", "N/A"])
+@pytest.mark.parametrize("mark", ["-", "N/A", "unknown"])
 def test_hemispheres_beside_marks_of_missing_ones(read, mark):
     """One mark among them, and they did not count."""
     letters = np.where(np.arange(COUNT) < 20, mark, "W")
@@ -230,7 +230,7 @@ def test_seconds_in_fewer_than_half_of_the_rows(read):
     assert len(places(read(time=time, lat=LAT, lon=LON))) == COUNT / 3
 
 
-@pytest.mark.parametrize("mark", ["", "-"])
+@pytest.mark.parametrize("mark", ["", "-", "unknown"])
 def test_a_date_beside_no_time_of_day_is_no_midnight(read, mark):
     """Rows of a receiver without a fix were some hours before the others."""
     times = (START + pd.to_timedelta(np.arange(COUNT), "s")).strftime("%H:%M:%S").to_numpy(object)
@@ -239,12 +239,13 @@ def test_a_date_beside_no_time_of_day_is_no_midnight(read, mark):
     np.testing.assert_allclose(places(found)["time_s"], TIME_S[20:])
 
 
-def test_a_date_that_stays_over_midnight_beside_rows_without_one(read):
+@pytest.mark.parametrize("mark", ["", "-", "unknown"])
+def test_a_date_that_stays_over_midnight_beside_rows_without_one(read, mark):
     """Rows after midnight were a day early."""
     times = START + pd.to_timedelta(50_300 + np.arange(COUNT), "s")
     given = np.arange(COUNT) % 10 > 0
-    date = np.where(given, "2026-05-13", "")
-    time = np.where(given, times.strftime("%H:%M:%S"), "")
+    date = np.where(given, "2026-05-13", mark)
+    time = np.where(given, times.strftime("%H:%M:%S"), mark)
     found = read(date=date, time=time, lat=LAT, lon=LON)
     np.testing.assert_allclose(places(found)["time_s"], TIME_S[given] + 50_300)
 
@@ -407,6 +408,9 @@ def test_times_of_day_in_one_number(read, monkeypatch, rows):
 @pytest.mark.parametrize("step", [0.5, 1, 7, 20])
 def test_seconds_are_no_times_of_day_in_one_number(read, step):
     time = 100_000 + step * np.arange(COUNT)
+    np.testing.assert_allclose(places(read(time=time, lat=LAT, lon=LON))["time_s"], time)
+    # Two runs of less than a minute.
+    time = np.append(np.arange(150) / 3, 50_000 + np.arange(150) / 3)
     np.testing.assert_allclose(places(read(time=time, lat=LAT, lon=LON))["time_s"], time)
 
 

@@ -186,15 +186,21 @@ class Columns:
             return pa.chunked_array([pa.repeat("", count)])
         return pc.fill_null(column.take(pa.array(index, mask=index < 0)), "")
 
+    def with_digits(self, *names: str) -> Bools:
+        """Return in which rows a column has a digit: words stand for missing numbers and times."""
+        column = self._raw(*names)
+        if column is None:
+            return np.zeros(len(self), dtype=bool)
+        return np.asarray(pc.match_substring_regex(column, _DIGIT).to_numpy(), dtype=bool)
+
     def first_text(self, name: str) -> str:
-        """Return the first text of a column that is no missing value; "" where there is none."""
+        """Return the first text of a column that has a digit; "" where there is none."""
         column = self._raw(name)
         if column is None:
             return ""
         # A receiver without a fix may leave a column blank for long.
-        trimmed = pc.utf8_trim_whitespace(column)
-        at = pc.index(pc.is_in(trimmed, pa.array(MISSING)), value=False).as_py()
-        return "" if at < 0 else str(trimmed[at].as_py())
+        at = pc.index(pc.match_substring_regex(column, _DIGIT), value=True).as_py()
+        return "" if at < 0 else str(column[at].as_py()).strip()
 
     def joined(self, before: str, name: str) -> Columns:
         """Return columns in which the texts of one follow those of another, after a blank.

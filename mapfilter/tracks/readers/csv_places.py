@@ -10,7 +10,7 @@ from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.tracks.position_units import UERE_M
-from mapfilter.tracks.readers.columns import MISSING, Columns
+from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.csv_fields import column_option
 from mapfilter.tracks.readers.csv_mapped import Mapped, add_rows
 from mapfilter.tracks.readers.csv_odometry import speeds_of
@@ -21,6 +21,7 @@ _NAMED = re.compile(
     r"(?:gps)?[ _]?(?:lat|latitude|lon|long|lng|longitude)[ /_]?"
     r"(?:(?:dir|hemi|ind|ref)\w*|n[ /_]?s|e[ /_]?w)|hemi\w*|n[ /_]?s|e[ /_]?w"
 )
+_MISSING_WORD = re.compile(r"\D{2,}")
 _FAR_DEG = 1.0
 """Farther from the equator and the meridian of Greenwich, none crosses them to the next row."""
 _SATELLITES = re.compile(
@@ -48,7 +49,9 @@ def hemisphere_columns(rows: Columns, taken: frozenset[str] = frozenset()) -> di
     for name in rows.names:
         if not _NAMED.fullmatch(name) or name in taken or rows.names.count(name) > 1:
             continue
-        texts = {str(text).upper() for text in np.unique(rows.texts(name)) if text not in MISSING}
+        every = {str(text).upper() for text in np.unique(rows.texts(name))} - {"", "-"}
+        # Words stand for missing ones.
+        texts = {text for text in every if not _MISSING_WORD.fullmatch(text)}
         for field, letters in _HEMISPHERES.items():
             if field not in found and texts and texts.issubset(letters):
                 found[field] = name

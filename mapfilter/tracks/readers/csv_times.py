@@ -49,8 +49,8 @@ _EARLY_S, _RECENT_S, _LATEST_S = 9e8, 1.6e9, 2.2e9
 _SAME_DATE = "time: the date stays the same over midnight: times go on with the next day"
 _PAUSE_S = 600.0
 _OF_DAY = "time: taken for hours, minutes and seconds of the day in one number, as 101530"
-_LONG, _SHORT = 300.0, 20.0
-"""Of times, and of their usual steps, to tell them from seconds."""
+_LONG, _SHORT, _JUMP, _FEWEST_JUMPS = 300.0, 20.0, 40.0, 3
+"""Of times, their steps and the jumps between their minutes, to tell them from seconds."""
 _DAYS = "time: days since 1900, as a spreadsheet writes them"
 
 
@@ -70,7 +70,8 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
     known = number[np.isfinite(number)]
     usual_s = abs(float(np.median(known))) if known.size else np.inf
     _check_digits(mapped, reading, known)
-    if known.size >= 0.5 * np.count_nonzero(~missing) and usual_s < LEAST_UNIX_S:
+    given = np.count_nonzero(mapped.rows.with_digits(*mapped.names("time")))
+    if known.size >= 0.5 * given and usual_s < LEAST_UNIX_S:
         if are_days(known) or (in_days(known) and _DAYS in reading.notes):
             reading.note(_DAYS)
             return _local(reading, np.round((number - _EPOCH_DAYS) * DAY_S, 3), options.zone)
@@ -155,7 +156,9 @@ def _without_digits(reading: Reading, number: Floats) -> Floats:
     if minutes.max() >= 60 or seconds.max() >= 60:
         return number
     steps = np.diff(np.unique(number[known]))
-    long = steps.sum() > _LONG and np.median(steps) <= _SHORT
+    # From one minute to the next such numbers jump by 40.
+    jumps = (steps > _JUMP) & (steps <= _JUMP + _SHORT)
+    long = steps[steps <= _JUMP + _SHORT].sum() > _LONG and jumps.sum() >= _FEWEST_JUMPS
     if not (long or _OF_DAY in reading.notes):
         return number
     reading.note(_OF_DAY)
@@ -210,7 +213,7 @@ def _note_gps(reading: Reading, name: str, known: Floats) -> None:
 def _over_midnight(mapped: Mapped, reading: Reading, time_s: Floats) -> Floats:
     """Return times that go on after midnight where a column of dates keeps the day of the start."""
     dates = mapped.rows.texts(DATE)
-    dates = dates[~mapped.rows.flags(DATE, true=MISSING)]
+    dates = dates[mapped.rows.with_digits(DATE)]
     if DATE not in mapped.beside or (dates[1:] != dates[:-1]).any():
         return time_s
     known_s = time_s[np.isfinite(time_s)]
