@@ -40,7 +40,8 @@ REMEDIES = {
     "area.crs), or project the file.",
     "datum-shifted": "Name the CRS that the numbers were made in: column crs of the plan, "
     "rasters.crs (ED50: EPSG:4230, in UTM zones EPSG:230xx).",
-    "degrees-for-metres": "Name columns of degrees lat and lon, or give metres in a projected CRS.",
+    "degrees-for-metres": "Name columns of degrees lat and lon, or give metres in a projected CRS; "
+    "of rasters by gdalwarp -t_srs EPSG:….",
     "duplicate-id": "Give each cell an id of its own.",
     "east-north-swapped": "Exchange the columns east and north.",
     "eirp-missing": "Name the column of the EIRP in cells.columns.eirp_dbm, or set cells.eirp_dbm, "

@@ -37,8 +37,8 @@ class Accuracy:
         When, after how many true metres, and how far off; NaN if it never switched, the latter two
         also where the ground truth does not tell.
     error_mean_m, error_67_m, error_95_m : float
-        Mean and percentiles of the error over all located epochs from the switch on at which the
-        truth is known.
+        Mean and percentiles of the error over all epochs with a position from the switch on, lost
+        ones too, at which the truth is known.
     scored_epochs : int
         How many those are.
     """

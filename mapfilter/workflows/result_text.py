@@ -10,6 +10,7 @@ from typing import Any
 
 _MOST_COUNTS = 12
 _MAX_TABLE_WIDTH = 200
+_PLACES = ("lon_deg", "lat_deg", "bounds_deg")
 
 
 def to_jsonable(value: Any) -> Any:
@@ -33,11 +34,11 @@ def to_jsonable(value: Any) -> Any:
     return value
 
 
-def text_lines(found: Mapping[str, Any], indent: str = "") -> Iterator[str]:
+def text_lines(found: Mapping[str, Any], indent: str = "", within: str = "") -> Iterator[str]:
     r"""Yield one line for each figure, nested ones indented; none for what is empty.
 
     Rows of the same figures are a table, where it is not too wide. Of many counts the largest are
-    shown, and what the others add up to.
+    shown, and what the others add up to. ``within`` is the name of what the figures are nested in.
 
     Examples
     --------
@@ -64,13 +65,14 @@ def text_lines(found: Mapping[str, Any], indent: str = "") -> Iterator[str]:
             continue
         if isinstance(value, Mapping):
             yield f"{indent}{key}:"
-            yield from text_lines(_largest(value), indent + "  ")
+            yield from text_lines(_largest(value), indent + "  ", key)
         elif isinstance(value, list):
             yield f"{indent}{key}:"
             for line in _table(value) or (_one_line(item, key) for item in value):
                 yield f"{indent}  {line}"
         else:
-            yield f"{indent}{key}: {_short(value, key)}"
+            name = within if within.endswith(_PLACES) else key
+            yield f"{indent}{key}: {_short(value, name)}"
 
 
 def _largest(found: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -114,7 +116,7 @@ def _short(value: Any, name: str) -> str:
     if value is None:
         return "-"
     if isinstance(value, float):
-        if name.endswith(("lon_deg", "lat_deg")):
+        if name.endswith(_PLACES):
             return f"{value:.6f}"
         return f"{value:.1f}" if abs(value) >= 1000 else f"{value:.4g}"
     return str(value)

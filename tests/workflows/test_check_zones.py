@@ -1,6 +1,7 @@
 """Sites in the zone of UTM that its rule without exceptions gives to western Norway."""
 
 import numpy as np
+import rasterio
 from check_world import make_world
 from command_line import assert_refused, mapfilter
 
@@ -45,3 +46,19 @@ def test_rasters_in_web_mercator_are_reported_as_build_reports_them(tmp_path):
     told = "found EPSG:3857, of which 100 m are 50 m"
     assert told in finding["evidence"]
     assert_refused(mapfilter("build", "-c", world.toml), told)
+
+
+def test_rasters_in_degrees_are_to_be_projected(tmp_path):
+    world = make_world(tmp_path, {})
+    world.landuse = None
+    world.write()
+    cells = [row["cell"] for row in world.rows]
+    with rasterio.open(
+        world.rasters, "w", driver="GTiff", height=40, width=40, count=len(cells),
+        dtype="float32", crs="EPSG:4326", transform=rasterio.Affine(1e-4, 0, 24.9, 0, -1e-4, 60.2),
+    ) as target:  # fmt: skip
+        target.write(np.full((len(cells), 40, 40), -70.0, dtype="float32"))
+        target.descriptions = cells
+    (finding,) = mapfilter("check", "-c", world.toml, "--json").json["findings"]
+    assert finding["code"] == "degrees-for-metres"
+    assert "gdalwarp" in finding["remedy"]

@@ -60,3 +60,11 @@ def test_numbers_are_to_the_right_also_where_some_are_missing():
         "  ekf            -    12.35",
         "  p_f          -17        -",
     ]
+
+
+def test_bounds_in_degrees_are_printed_to_decimetres():
+    box = {"west": -56.1942492, "south": -34.9128812}
+    lines = list(text_lines({"bounds_deg": box, "shares": box}))
+    assert lines[:3] == ["bounds_deg:", "  west: -56.194249", "  south: -34.912881"]
+    assert lines[3:] == ["shares:", "  west: -56.19", "  south: -34.91"]
+    assert list(text_lines({"bounds_deg": [139.6917001]})) == ["bounds_deg:", "  139.691700"]
