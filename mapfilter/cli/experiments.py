@@ -261,7 +261,7 @@ def evaluate(
     if name == "single-reports" and data is not None:
         unused = {"--map": map_file, "--bbox": bbox, "--filter": filter_name, "--config": config}
         refuse(unused | {"--world": world, "--set": settings}, name)
-        refuse({"--runs": runs}, name)
+        refuse({"--runs": runs, "--seed": seed or None, "--resume": resume or None}, name)
         folder = (out or Path("out") / name).absolute()
         with nothing_left(folder), rate_bar("evaluate", "runs") as progress:
             result = run_single_reports(data, folder, sets=cases or SETS, progress=progress)
