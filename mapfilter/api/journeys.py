@@ -72,7 +72,7 @@ def simulate(
     Raises
     ------
     InputError
-        Plan and roads differ in their CRS, or no route is as long as wanted.
+        Rasters, plan and roads differ in their CRS, or no route is as long as wanted.
     ConfigError
         An argument is none of these, or the seed is none.
     """

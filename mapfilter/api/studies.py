@@ -118,7 +118,7 @@ def sweep(
     Raises
     ------
     InputError
-        No route is as long as wanted.
+        Database, rasters and roads differ in their CRS, or no route is as long as wanted.
     ConfigError
         An argument is none of these, or the seed is none.
     """

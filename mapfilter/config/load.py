@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
@@ -170,17 +170,19 @@ def _apply(values: dict[str, Any], setting: str, faults: Faults) -> None:
             faults.add(where, "a section", f"{parent}, which is a value")
             return
     value = _parse_value(text.strip())
-    if _is_path((*parents, last)):
+    resolver = _resolver_of((*parents, last))
+    if resolver is not None:
+        names = MAP_NAMES if resolver is resolve_map else ()
         if isinstance(value, list) and text.strip().startswith("["):
-            value = [_absolute(item) if isinstance(item, str) else item for item in value]
+            value = [_absolute(item, names) if isinstance(item, str) else item for item in value]
         else:
             # A folder may be called 2024, which TOML takes for a number.
-            value = _absolute(value if isinstance(value, str) else text.strip())
+            value = _absolute(value if isinstance(value, str) else text.strip(), names)
     place[last] = value
 
 
-def _absolute(value: str) -> str:
-    as_it_is = value in ("", *MAP_NAMES) or value.startswith("~")
+def _absolute(value: str, names: Collection[str]) -> str:
+    as_it_is = value in ("", *names) or value.startswith("~")
     return value if as_it_is else str(Path(value).absolute())
 
 
@@ -193,8 +195,8 @@ def _parse_value(text: str) -> Any:
     return text
 
 
-def _is_path(keys: tuple[str, ...]) -> bool:
-    """Return whether a setting fills a field of paths."""
+def _resolver_of(keys: tuple[str, ...]) -> Callable[..., Any] | None:
+    """Return what makes a setting absolute that fills a field of paths; None for other fields."""
     annotation: Any = Config
     for key in keys:
         annotation = annotation_in(annotation, key)
@@ -202,4 +204,5 @@ def _is_path(keys: tuple[str, ...]) -> bool:
     marks = [*getattr(inner, "__metadata__", ())]
     for variant in get_args(get_args(inner)[0] if marks else inner):
         marks += getattr(variant, "__metadata__", ())
-    return any(isinstance(m, BeforeValidator) and m.func in _RESOLVERS for m in marks)
+    found = (mark.func for mark in marks if isinstance(mark, BeforeValidator))
+    return next((one for one in found if one in _RESOLVERS), None)

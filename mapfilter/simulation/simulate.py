@@ -110,13 +110,16 @@ def simulate_journeys(
     Raises
     ------
     InputError
-        Plan and network differ in their CRS, or no route is as long as wanted.
+        Rasters, plan and network differ in their CRS, or no route is as long as wanted.
     """
     settings = settings or SimulationSettings()
     if not same_crs(plan.crs, network.crs):
         expected = f"the streets' {shown_crs(network.crs)}"
         raise fail(InputError, "cell plan, crs", expected, shown_crs(plan.crs))
     if isinstance(levels, RxLevRasters):
+        if not same_crs(levels.lattice.crs, network.crs):
+            expected = f"the rasters' {shown_crs(levels.lattice.crs)}"
+            raise fail(InputError, "streets, crs", expected, shown_crs(network.crs))
         levels = level_sampler(levels, plan.ids, plan=plan)
     walk, leg_m = settings.journey, settings.journey.leg_m
     for j in range(settings.journeys):

@@ -12,7 +12,6 @@ import numpy as np
 from mapfilter._io import ensure_writable_folder
 from mapfilter._json_files import write_json
 from mapfilter._parallel import Progress
-from mapfilter.errors import ConfigError, fail
 from mapfilter.experiments.benchmarks.ottawa import PARTS
 from mapfilter.experiments.benchmarks.ottawa_sessions import read_session
 from mapfilter.experiments.benchmarks.single_reports import (
@@ -31,6 +30,7 @@ from mapfilter.positioning.fingerprints.options import AUTO
 from mapfilter.report.canvas import BLACK, GREEN, GREY, ORANGE, PURPLE, SKY
 from mapfilter.report.cumulative import Distribution, axis_end_m, plot_cumulative
 from mapfilter.report.saving import save
+from mapfilter.workflows.evaluate import check_names
 from mapfilter.workflows.evaluate_ottawa import session_files
 from mapfilter.workflows.result_text import to_jsonable
 
@@ -81,9 +81,7 @@ def run_single_reports(
         A set is unknown, missing or damaged, or the output cannot be written.
     """
     began_s = time.perf_counter()
-    for name in sets:
-        if name not in SETS:
-            raise fail(ConfigError, "--case", ", ".join(SETS), repr(name))
+    sets = check_names(sets, SETS)
     ensure_writable_folder(out)
     rows: list[SingleReportsRow] = []
     done, count = 0, len(sets) * len(methods)

@@ -7,6 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from mapfilter.config.fields import Section, with_options
+from mapfilter.config.load import load_config
 from mapfilter.options import Options
 
 
@@ -81,3 +82,18 @@ def test_without_a_path_there_is_the_default():
     assert OtherSection().table is None
     with pytest.raises(ValidationError):
         TerrainSection.model_validate({"heights": 5})
+
+
+def test_paths_of_settings_that_are_called_like_maps_are_of_the_working_folder(
+    tmp_path, monkeypatch
+):
+    (tmp_path / "areas").mkdir()
+    area = tmp_path / "areas" / "area.toml"
+    area.write_text('[area]\nmap = "helsinki"\n')
+    monkeypatch.chdir(tmp_path)
+    settings = ["database.path=helsinki", 'track.recordings=["none"]']
+    config = load_config(area, settings)
+    assert config.database.path == tmp_path / "helsinki"
+    assert config.track.recordings == (tmp_path / "none",)
+    assert config.area.map == "helsinki"
+    assert load_config(area, ["area.map=manhattan"]).area.map == "manhattan"

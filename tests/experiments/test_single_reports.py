@@ -50,7 +50,7 @@ def test_sessions_without_a_cell_in_common_are_not_located(tmp_path):
         others = {"mcc": 302, "mnc": 720, "lac": 1, "rating": 5, "speed": 1, "direction": 0}
         rows.assign(**others, signal=-90, ta=-1).to_csv(folder / f"s{number}.csv", index=False)
     result = run_single_reports(
-        tmp_path, tmp_path / "out", sets=("carling",), methods=("centroid",)
+        tmp_path, tmp_path / "out", sets=("carling", "carling"), methods=("centroid",)
     )
     (row,) = result.rows
     assert (row.reports, row.located) == (40, 0)

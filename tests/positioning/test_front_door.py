@@ -16,11 +16,13 @@ from matplotlib.figure import Figure
 
 import mapfilter as mf
 from mapfilter.database.build import build
+from mapfilter.errors import InputError
 from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Reason
 from mapfilter.positioning.locators import as_filter
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
+from mapfilter.roads.routes import read_roads
 
 
 @pytest.fixture(scope="module")
@@ -349,6 +351,14 @@ def test_a_sweep_takes_reports_and_periods_as_given(database, rasters, streets):
     assert set(runs["radio"]) == {"ground truth"}
     plain = mf.ReportModel(report_period_s=5.0, radio="as_predicted")
     assert set(swept(database, rasters, streets, reports=plain).runs["radio"]) == {"as_predicted"}
+
+
+def test_streets_of_another_system_than_the_rasters_are_refused(database, rasters, streets):
+    ways = replace(read_roads(streets, rasters.lattice).ways, crs="EPSG:32630")
+    with pytest.raises(InputError, match="streets, crs: expected the rasters' EPSG:32629"):
+        swept(database, rasters, ways)
+    with pytest.raises(InputError, match="streets, crs"):
+        mf.simulate(rasters, replace(database.plan, crs="EPSG:32630"), ways, length_m=200.0)
 
 
 def test_noises_of_any_field_have_cells_of_their_own(database, rasters, streets):

@@ -115,6 +115,7 @@ def test_an_older_version_is_not_resumed(parts, whole, tmp_path, monkeypatch):
         monkeypatch.setattr(run, "_VERSION", version)
         with pytest.raises(ConfigError, match="another version of the sweep"):
             sweep(*parts, out, resume=True)
+        assert (out / "unfinished").exists() == (stops is not None)
         assert sweep(*parts, out).read_bytes() == whole
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from command_line import mapfilter
+from command_line import assert_refused, mapfilter
 from scipy.io import savemat
 
 from mapfilter.errors import ConfigError, InputError, Stopped, fail
@@ -275,3 +275,11 @@ def test_wifi_sets_by_the_command(tmp_path):
     worst = done.json["worst"]
     assert len(worst) == len(rows) == len(list((out / "pictures").glob("*.png")))
     assert all(" m off; the 95 % radius of " in one["what"] for one in worst)
+
+
+def test_single_reports_refuse_a_seed_and_going_on_as_nothing_is_drawn_or_kept(tmp_path):
+    told = mapfilter(
+        *("evaluate", "single-reports", "--data", tmp_path, "--seed", 1, "--resume"),
+        *("--out", tmp_path / "out"),
+    )
+    assert_refused(told, "--seed", "--resume")

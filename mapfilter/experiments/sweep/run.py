@@ -20,6 +20,7 @@ from mapfilter._io import ensure_writable_folder, sha256_file
 from mapfilter._parallel import Progress, SerialExecutor, ordered_results
 from mapfilter._resume import check_same, kept_when_stopped, start_or_resume, with_code
 from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.errors import MapfilterError
 from mapfilter.evaluation.accuracy import accuracy
 from mapfilter.evaluation.claims import claimed_radii
 from mapfilter.experiments.sweep import table
@@ -137,7 +138,11 @@ def sweep(
     }
     finished, begun = out / table.HEAD, unfinished / table.HEAD
     if resume and finished.is_file() and not begun.is_file():
-        check_same(finished, head, _DETERMINED_BY)
+        try:
+            check_same(finished, head, _DETERMINED_BY)
+        except MapfilterError:
+            _remove(unfinished)
+            raise
         if table.is_whole(out / RUNS):
             _remove(unfinished)
             return out / RUNS

@@ -15,6 +15,7 @@ from mapfilter._json_files import read_json, write_json
 from mapfilter._types import Floats32
 from mapfilter.database.store import open_database, read_cells, write_cells
 from mapfilter.errors import InputError, StoreError, fail
+from mapfilter.geodesy import same_crs, shown_crs
 from mapfilter.lattice import Lattice
 from mapfilter.positioning.filter import Filter, FilterOptions
 from mapfilter.radio.cells import CellPlan
@@ -61,8 +62,13 @@ class SweepWorld:
         lattices = {one.lattice for one in rasters.values()}
         if len(lattices) != 1:
             raise fail(InputError, "rasters", "one lattice for all", f"{len(lattices)} of them")
+        lattice = lattices.pop()
+        for where, crs in [("streets", network.crs), ("cell plan", plan.crs)]:
+            if not same_crs(crs, lattice.crs):
+                expected = f"the rasters' {shown_crs(lattice.crs)}"
+                raise fail(InputError, f"{where}, crs", expected, shown_crs(crs))
         levels_dbm = {name: all_levels_dbm(one, plan) for name, one in rasters.items()}
-        return cls(network, plan, lattices.pop(), levels_dbm, heights_m)
+        return cls(network, plan, lattice, levels_dbm, heights_m)
 
     @property
     def inside(self) -> Inside | None:
