@@ -131,7 +131,7 @@ FORCE = {f"Acc {axis} (m/s^2)": 9.8 for axis in "xyz"}
         ({**ROTATION, **FORCE}, {"gyroscope", "accelerometer"}),
         ({"acc_x (m/s2)": 0.1, "acc_y (m/s2)": 0.1, "acc_z (m/s2)": 9.8}, {"accelerometer"}),
     ],
-    ids=lambda given: "-".join(given),
+    ids=lambda given: "-".join(sorted(given)),
 )
 def test_units_in_parentheses_alone_make_no_file_of_phyphox(tmp_path, columns, tables):
     """Other columns than those of one sensor were lost, refused, or km/h were m/s."""

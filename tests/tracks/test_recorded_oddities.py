@@ -446,7 +446,7 @@ def test_poses_below_comments_have_the_times_of_their_frames(comments, tmp_path)
             {"accelerometer", "gyroscope", "orientation"},
         ),
     ],
-    ids=lambda given: "-".join(given),
+    ids=lambda given: "-".join(sorted(given)),
 )
 def test_as_many_columns_as_a_pose_has_are_a_plain_table_by_their_names(read, columns, tables):
     """Positions beside an attitude were a trajectory in degrees."""
