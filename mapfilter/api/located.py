@@ -39,6 +39,7 @@ from mapfilter.positioning.log_lacks import (
 )
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
 from mapfilter.positioning.positioned_track import PositionedTrack
+from mapfilter.positioning.timing_steps import with_one_step
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
@@ -231,6 +232,7 @@ def locate(
     log = with_range_notes(name_by_plan(log, plan), plan)
     made = given_filter if isinstance(given_filter, Filter) else None
     chosen = given_filter if made is None or made.made_of is None else made.made_of
+    log = with_one_step(log, chosen)
     options, notes = fitted_to_log(chosen, log)
     alone = made is None and database is not None and by_streets_alone(options, log, database)
     notes = (*notes, STREETS_ALONE) if alone else notes

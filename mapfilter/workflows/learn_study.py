@@ -35,6 +35,7 @@ from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.filter import Filter, FilterOptions
 from mapfilter.positioning.log_options import fitted_to_log
 from mapfilter.positioning.loop import locate
+from mapfilter.positioning.timing_steps import with_one_step
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
@@ -246,7 +247,7 @@ class _Study:
 
 def _located(task: _Task) -> bytes:
     """Locate one journey, on a worker."""
-    log = blank_log(task.log) if task.is_blank else task.log
+    log = with_one_step(blank_log(task.log) if task.is_blank else task.log, task.choice)
     rng = named_rng(task.seed, "learn", task.name)
     choice, _ = fitted_to_log(task.choice, log)
     filter_ = _filter(task.database, choice, task.sha256)

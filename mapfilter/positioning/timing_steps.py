@@ -1,0 +1,48 @@
+"""Timing advances of several technologies in one log: a filter reads steps of one length."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pandas as pd
+
+from mapfilter.positioning.log_options import has_default
+from mapfilter.radio.identities import TIMING_STEP_M
+from mapfilter.tracks.log import TrackLog
+
+
+def with_one_step(log: TrackLog, options: Any) -> TrackLog:
+    """Return a log without timing advances in other steps than most, and a note on these.
+
+    Those of GSM or LTE stay, whichever are more; those of NR, whose steps depend on the numerology,
+    and those without a technology beside others go. All stay where the log states no technology, or
+    options set the length of a step.
+
+    Examples
+    --------
+    >>> from mapfilter.positioning.bayes.options import BayesFilter
+    >>> from mapfilter.tracks.log import make_log
+    >>> rows = {"time_s": [0.0, 1.0, 2.0], "role": "serving", "timing_advance": [7, 9, 1]}
+    >>> radio = pd.DataFrame(rows).assign(technology=["LTE", "LTE", "GSM"])
+    >>> log = with_one_step(make_log("EPSG:32635", radio=radio), BayesFilter())
+    >>> log.radio["timing_advance"].tolist(), log.notes
+    ([7, 9, <NA>], ('timing advance: 1 of GSM left out, beside those of LTE',))
+    """
+    if "technology" not in log.radio or not has_default(options, "timing_step_m"):
+        return log
+    rows = log.radio
+    stated = rows["technology"].where(rows["timing_advance"].notna())
+    counts = stated.dropna().value_counts()
+    if counts.empty:
+        return log
+    read = max(TIMING_STEP_M, key=lambda name: int(counts.get(name, 0)))
+    other = (rows["timing_advance"].notna() & (stated != read)).to_numpy()
+    if not other.any():
+        return log
+    names = rows["technology"][other].fillna("no stated technology").value_counts(sort=False)
+    left_out = ", ".join(f"{count} of {name}" for name, count in sorted(names.items()))
+    beside = f", beside those of {read}" if read in counts else ": their steps are not known"
+    advances = rows["timing_advance"].mask(pd.Series(other, index=rows.index))
+    note = f"timing advance: {left_out} left out{beside}"
+    return replace(log, radio=rows.assign(timing_advance=advances), notes=(*log.notes, note))
