@@ -72,12 +72,14 @@ def test_sensors_that_do_not_measure_are_told_with_their_rows(monkeypatch, motio
     assert state.watch == watch._replace(undirected=directed)
 
 
-@pytest.mark.parametrize(
-    ("served", "label"),
-    [("X", ("serving", "X", Reason.UNKNOWN_CELL)), (None, ("serving", "", Reason.NO_SERVING_CELL))],
-)
-def test_a_serving_cell_that_is_not_used_is_named_and_no_neighbour(served, label):
-    rows = replace(ROW, role="neighbour"), replace(ROW, cell=served)
+def test_a_serving_cell_that_is_not_used_is_named_and_no_neighbour():
+    rows = replace(ROW, role="neighbour"), replace(ROW, cell="X")
+    assert told(stepped(given={"radio": rows})[1])[-1] == ("serving", "X", Reason.UNKNOWN_CELL)
+
+
+def test_a_report_whose_serving_cell_has_no_name_is_named_by_another():
+    rows = replace(ROW, role="neighbour"), replace(ROW, cell=None)
+    label = "serving", ROW.cell, Reason.NO_SERVING_CELL
     assert told(stepped(given={"radio": rows})[1])[-1] == label
 
 

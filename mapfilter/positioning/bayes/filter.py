@@ -235,7 +235,9 @@ class BayesPositioner(Filter[BayesState]):
         if gnss.was_used(epoch.time_s):
             state = replace(state, watch=state.watch.positioned(epoch.time_s))
         if reason not in _TOLD_ELSEWHERE:
-            cell = serving_cell(epoch) or ""
+            # Of a report without a serving cell, the first one.
+            named = (row.cell for row in epoch.radio if row.cell is not None)
+            cell = serving_cell(epoch) or next(named, "")
             unused.append(UnusedReading(epoch.time_s, "serving", cell, reason))
         return step_output(
             self.area, state, epoch.time_s, reason, tuple(unused), positions_only=self.scored

@@ -76,11 +76,17 @@ def _numbers(line: str, count: int) -> Floats | None:
 
 
 def _has_quaternion(row: Floats) -> bool:
-    return bool(abs(np.linalg.norm(row[4:]) - 1.0) <= _CROOKED)
+    return _are_units(row[4:])
 
 
 def _has_rotation(row: Floats) -> bool:
-    lengths = np.linalg.norm(row.reshape(3, 4)[:, :3], axis=1)
+    return _are_units(row.reshape(3, 4)[:, :3])
+
+
+def _are_units(vectors: Floats) -> bool:
+    # Numbers of damaged files may be too large to be squared.
+    with np.errstate(over="ignore", invalid="ignore"):
+        lengths = np.linalg.norm(vectors, axis=-1)
     return bool((np.abs(lengths - 1.0) <= _CROOKED).all())
 
 
