@@ -151,10 +151,8 @@ class LogReplay:
             from mapfilter.workflows.replay_page import with_page
 
             written = with_page(written, log, found.track, found.recorder, database, into)
-        unknown = written.outcome.unknown_cells
-        return replace(
-            written, foreign=foreign_cells(unknown, self.filters.plan(self._crs(opened.log)))
-        )
+        plan = self.filters.plan(self._crs(opened.log))
+        return replace(written, foreign=foreign_cells(written.outcome.unknown_cells, plan))
 
     def _crs(self, log: TrackLog) -> str:
         database = self.filters.database
