@@ -28,7 +28,8 @@ from mapfilter.database.manifest import (
     describe_part,
     levels_folders,
 )
-from mapfilter.database.measured import MeasuredParts, write_measured
+from mapfilter.database.measured import MeasuredParts
+from mapfilter.database.measured_files import write_measured
 from mapfilter.database.parquet import (
     dictionary,
     geo_metadata,

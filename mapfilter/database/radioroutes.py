@@ -16,7 +16,8 @@ from mapfilter._types import Floats32, Ints32
 from mapfilter.database.checked import Part, part_named
 from mapfilter.database.field import RadioField, fill_field
 from mapfilter.database.manifest import DEVIATIONS, POINTS, READINGS
-from mapfilter.database.measured import MeasuredParts, read_measured
+from mapfilter.database.measured import MeasuredParts
+from mapfilter.database.measured_files import read_measured
 from mapfilter.database.parquet import WindowReader, check_places, read_columns
 from mapfilter.database.points import Points, read_points, way_columns
 from mapfilter.errors import InputError, fail

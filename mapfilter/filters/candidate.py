@@ -14,7 +14,7 @@ The paper leaves several things open; each is a field of
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from math import cos, isfinite, nan, sin
 from typing import Annotated, Literal, Protocol
@@ -166,15 +166,13 @@ class CandidateSearch:
             return belief, Reason.NO_STEP
         if not isfinite(heading_rad):
             return belief, Reason.NO_HEADING
-        moved = CandidateBelief(
-            belief.mode,
-            belief.east_m,
-            belief.north_m,
+        moved = replace(
+            belief,
             # Line 7 takes the length of the vector: a noisy step below zero counts as positive.
-            belief.travelled_m + abs(step_m),
-            belief.shift_east_m + step_m * cos(heading_rad),
-            belief.shift_north_m + step_m * sin(heading_rad),
-            heading_rad,
+            travelled_m=belief.travelled_m + abs(step_m),
+            shift_east_m=belief.shift_east_m + step_m * cos(heading_rad),
+            shift_north_m=belief.shift_north_m + step_m * sin(heading_rad),
+            heading_rad=heading_rad,
         )
         return moved, Reason.USED
 

@@ -15,11 +15,7 @@ import numpy as np
 
 from mapfilter._device import arrays_of
 from mapfilter._types import Floats, Floats32, Ints, Ints32
-from mapfilter.models.level_covariance import (
-    absence_gains,
-    aged,
-    sequential_updates,
-)
+from mapfilter.models.level_covariance import absence_gains, aged, sequential_updates
 from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.models.level_kernels import LevelTerms
 
@@ -217,18 +213,7 @@ class LevelMemory:
             (self.other_dbm, OTHER_DBM, keep),
             (self.other_db2, OTHER_SD_DB**2, keep**2),
         )
-        memory = LevelMemory(
-            errors,
-            self.site,
-            self.band,
-            self.prior_db2,
-            covariance,
-            other_dbm,
-            other_db2,
-            self.used,
-            self.reports,
-            self.other_log_likelihood,
-        )
+        memory = replace(self, covariance_db2=covariance, other_dbm=other_dbm, other_db2=other_db2)
         return memory._with_slots_of(self), decay
 
     def updated(
@@ -259,36 +244,20 @@ class LevelMemory:
             _NEGLIGIBLE / 10,
         )
         used[slot] = self.reports
-        memory = LevelMemory(
-            self.errors,
-            self.site,
-            self.band,
-            self.prior_db2,
-            covariance,
-            other_dbm,
-            other_db2,
-            used,
-            self.reports + 1,
-            self.other_log_likelihood,
+        memory = replace(
+            self,
+            covariance_db2=covariance,
+            other_dbm=other_dbm,
+            other_db2=other_db2,
+            used=used,
+            reports=self.reports + 1,
         )
         memory._with_slots_of(self)
         return memory, LevelTerms(report.cell, slot, report.level_dbm, gain, variance, other)
 
     def with_other(self, log_likelihood: float) -> LevelMemory:
         """Return the memory with the last report's log-likelihood under wrong predictions."""
-        memory = LevelMemory(
-            self.errors,
-            self.site,
-            self.band,
-            self.prior_db2,
-            self.covariance_db2,
-            self.other_dbm,
-            self.other_db2,
-            self.used,
-            self.reports,
-            log_likelihood,
-        )
-        return memory._with_slots_of(self)
+        return replace(self, other_log_likelihood=log_likelihood)._with_slots_of(self)
 
     def _with_slots_of(self, before: LevelMemory) -> LevelMemory:
         """Take over the look-up of slots from a memory with the same bands."""

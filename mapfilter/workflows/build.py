@@ -20,7 +20,8 @@ from mapfilter.database.build_job import TASKS_A_WORKER
 from mapfilter.database.estimate import BuildEstimate, dry_run
 from mapfilter.database.floor import floor_notes, weak_points_note
 from mapfilter.database.manifest import InputFile
-from mapfilter.database.measured import Readings, read_checked_readings
+from mapfilter.database.measured import Readings
+from mapfilter.database.measured_files import read_checked_readings
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.database.tiles import get_ready_to_read

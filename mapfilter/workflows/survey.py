@@ -14,7 +14,8 @@ from mapfilter._parallel import Progress
 from mapfilter._words import number_of
 from mapfilter.config.sections import Config
 from mapfilter.database.floor import floor_of
-from mapfilter.database.measured import Readings, readings_parquet
+from mapfilter.database.measured import Readings
+from mapfilter.database.measured_files import readings_parquet
 from mapfilter.errors import ConfigError, fail, listed
 from mapfilter.radio.cells import CellPlan, write_cell_plan
 from mapfilter.rasters.geotiff import READINGS_TAG

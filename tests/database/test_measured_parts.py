@@ -17,6 +17,8 @@ from mapfilter.database.measured import (
     Readings,
     deviations_at_points,
     merged_parts,
+)
+from mapfilter.database.measured_files import (
     read_checked_readings,
     read_measured,
     read_readings,

@@ -15,7 +15,7 @@ from mapfilter._json_files import sealed
 from mapfilter.database import store
 from mapfilter.database.checked import BLOCK_BYTES, Part, _CheckedFile, generation_of
 from mapfilter.database.manifest import READINGS, describe_part, read_manifest
-from mapfilter.database.measured import read_checked_readings
+from mapfilter.database.measured_files import read_checked_readings
 from mapfilter.database.parquet import (
     WindowReader,
     damaged,

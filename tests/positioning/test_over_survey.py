@@ -8,14 +8,8 @@ import pytest
 
 from mapfilter._json_files import sealed
 from mapfilter.database.build import build
-from mapfilter.database.measured import (
-    Deviations,
-    MeasuredParts,
-    Readings,
-    read_measured,
-    read_readings,
-    write_readings,
-)
+from mapfilter.database.measured import Deviations, MeasuredParts, Readings
+from mapfilter.database.measured_files import read_measured, read_readings, write_readings
 from mapfilter.database.merge import merge
 from mapfilter.database.store import open_database
 from mapfilter.errors import StoreError

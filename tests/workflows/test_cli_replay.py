@@ -33,7 +33,7 @@ from mapfilter.positioning.loop import locate
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.tracks.store import read_log, write_log
 from mapfilter.viewing.words import REASONS
-from mapfilter.workflows import replay as workflow
+from mapfilter.workflows import replay_log
 from mapfilter.workflows.replay import run_replay
 
 
@@ -222,13 +222,13 @@ def test_notes_known_before_are_printed_before_a_log_is_located(log, replay, mon
         before.append(sys.stderr.getvalue())
         return locate(*args, **options)
 
-    monkeypatch.setattr(workflow, "locate", located)
+    monkeypatch.setattr(replay_log, "locate", located)
     done = assert_done(replay(log))
     assert before == [f"mapfilter: note: {note}\n"]
     assert done.err.count(note) == 1
 
     refused = fail(InputError, "motion.csv", "steps", "none")
-    monkeypatch.setattr(workflow, "locate", Mock(side_effect=refused))
+    monkeypatch.setattr(replay_log, "locate", Mock(side_effect=refused))
     assert_refused(replay(log), note, "found none")
 
 
@@ -359,7 +359,7 @@ def test_a_logs_randomness_depends_on_its_name_not_on_its_neighbours(world, tmp_
         drawn.setdefault(log.truth_length_m, []).append(rng.integers(2**62))
         return locate(log, filter_, rng, **options)
 
-    monkeypatch.setattr("mapfilter.workflows.replay.locate", drawing)
+    monkeypatch.setattr("mapfilter.workflows.replay_log.locate", drawing)
     settings = ["output.pictures=none", f"database.path={world.database}"]
     for path in (world.journeys, world.journeys / "journey-0001-draw-000"):
         config = load_config(world.toml, [*settings, f"track.path={path}"])
@@ -383,8 +383,8 @@ def test_logs_share_a_filter_where_their_options_are_equal(same, world, tmp_path
         filters.append(filter_)
         return locate(log, filter_, rng, **options)
 
-    monkeypatch.setattr("mapfilter.workflows.replay.fitted_to_log", fitted)
-    monkeypatch.setattr("mapfilter.workflows.replay.locate", drawing)
+    monkeypatch.setattr("mapfilter.workflows.replay_log.fitted_to_log", fitted)
+    monkeypatch.setattr("mapfilter.workflows.replay_log.locate", drawing)
     settings = ["output.pictures=none", f"database.path={world.database}"]
     config = load_config(world.toml, [*settings, f"track.path={world.journeys}"])
     run_replay(config, tmp_path / "out")
@@ -398,7 +398,7 @@ def test_older_results_stay_when_a_replay_is_stopped(world, tmp_path, monkeypatc
     assert_done(mapfilter("replay", "-c", world.toml, *given))
     (tmp_path / "out" / "mine.txt").write_text("of the user")
     before = contents(tmp_path / "out")
-    located, calls = workflow.locate, []
+    located, calls = replay_log.locate, []
 
     def stopped(*args, **named):
         calls.append(args)
@@ -407,7 +407,7 @@ def test_older_results_stay_when_a_replay_is_stopped(world, tmp_path, monkeypatc
             time.sleep(30)
         return located(*args, **named)
 
-    monkeypatch.setattr(workflow, "locate", stopped)
+    monkeypatch.setattr(replay_log, "locate", stopped)
     outcome = mapfilter("replay", "-c", world.toml, *given, *settings(filter__margin_db=3.0))
     assert (outcome.code, outcome.out) == (128 + signal.SIGTERM, "")
     assert "stopped by SIGTERM" in outcome.err

@@ -6,7 +6,7 @@ import shutil
 import pytest
 from command_line import ONE, assert_done, assert_refused, contents, mapfilter, settings
 
-from mapfilter.workflows import replay
+from mapfilter.workflows import replay_log
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +80,7 @@ def test_the_folders_of_all_logs_are_looked_at_before_the_first_is_located(
     (tmp_path / "all" / last).mkdir(parents=True)
     (tmp_path / "all" / last / "figures.json").write_text('{"mine": 1}', encoding="utf-8")
     located = []
-    monkeypatch.setattr(replay, "locate", lambda *given, **_: located.append(given))
+    monkeypatch.setattr(replay_log, "locate", lambda *given, **_: located.append(given))
     out = "--out", tmp_path / "all"
     assert_refused(commands["replay"](world.journeys, *out), f"{last}/figures.json", "found others")
     assert not located

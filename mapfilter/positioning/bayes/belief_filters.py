@@ -25,8 +25,7 @@ from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules, RivalRu
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.rides import rides_unheard, rode
 from mapfilter.positioning.bayes.state import BayesState
-from mapfilter.positioning.gnss.source import GnssSource
-from mapfilter.positioning.gnss.state import GnssState
+from mapfilter.positioning.gnss.source import GnssSource, gnss_of
 from mapfilter.positioning.sensors.watch import SensorWatch
 
 MapFilter = BeliefFilter[Start, Any, RadioReading]
@@ -90,8 +89,7 @@ class BeliefFilters:
 
         One that the alternative used counts as well: it is to be found by positions, too.
         """
-        gnss: GnssState = state.sources[GnssSource.name]
-        used_at_m, other = gnss.used_at_m, state.alternative
+        used_at_m, other = gnss_of(state).used_at_m, state.alternative
         if other is not None and GnssSource.name in other.sources:
             used_at_m = max(used_at_m, other.sources[GnssSource.name].used_at_m)
         return state.reckoning.travelled_m - used_at_m <= _POSITIONED_M
@@ -106,8 +104,7 @@ class BeliefFilters:
         compass = state.compass if compass is None else compass
         if self.carriageways is None or compass or not self.map_may_start:
             return None
-        gnss: GnssState = state.sources[GnssSource.name]
-        return None if gnss.met else self.carriageways
+        return None if gnss_of(state).met else self.carriageways
 
     def moving_filter(self, state: BayesState, *, compass: bool) -> MapFilter:
         """Return the filter that starts and moves beliefs."""
@@ -122,8 +119,7 @@ class BeliefFilters:
 
     def goes_by_ways(self, state: BayesState) -> bool:
         """Return whether there were steps, none of them with a direction, and no positions."""
-        gnss: GnssState = state.sources[GnssSource.name]
-        return self.followed_ways(state) and not gnss.met
+        return self.followed_ways(state) and not gnss_of(state).met
 
     def followed_ways(self, state: BayesState) -> bool:
         """Return whether hypotheses have followed the ways, as no step had a direction."""
@@ -231,8 +227,7 @@ class BeliefFilters:
 
         They are those of a belief that is wrong to fixes that are; -inf without such fixes.
         """
-        gnss: GnssState = state.sources[GnssSource.name]
-        found = gnss.trail.contradiction
+        found = gnss_of(state).trail.contradiction
         if found is None:
             return -inf
         if found.goes_on:
@@ -254,8 +249,7 @@ class BeliefFilters:
 
     def used_positions(self, state: BayesState) -> bool:
         """Return whether a position or satellites have been used so far."""
-        gnss: GnssState = state.sources[GnssSource.name]
-        return isfinite(gnss.used_at_m)
+        return isfinite(gnss_of(state).used_at_m)
 
     def _is_led(self, state: BayesState) -> bool:
         # Without directions a belief without positions would soon be anywhere.
@@ -264,16 +258,14 @@ class BeliefFilters:
         found = state.belief.status is Status.TRACKING
         if state.status not in (_FOLLOWED if found else _SOUGHT):
             return False
-        gnss: GnssState = state.sources[GnssSource.name]
-        return self.used_positions(state) and not gnss.rejecting
+        return self.used_positions(state) and not gnss_of(state).rejecting
 
     def other_unit_m(self, state: BayesState) -> float:
         """Return a further unit in which steps may be given, by their speed; 1 for none.
 
         That is where they are a walker's by all that is stated, but not by their speed.
         """
-        gnss: GnssState = state.sources[GnssSource.name]
-        if not self.holds.watched or not state.compass or gnss.met:
+        if not self.holds.watched or not state.compass or gnss_of(state).met:
             return 1.0
         return state.watch.pace.other_unit_m
 
@@ -282,8 +274,7 @@ class BeliefFilters:
         rest = state.watch.rest
         if rest is None or not self.holds.watched or not rest.is_doubtful:
             return False
-        gnss: GnssState = state.sources[GnssSource.name]
-        return state.reckoning.travelled_m > gnss.used_at_m
+        return state.reckoning.travelled_m > gnss_of(state).used_at_m
 
     def may_be_anywhere(self, state: BayesState, watch: SensorWatch, time_s: float) -> bool:
         """Return whether a walker rode before an epoch; ``watch`` is that of after it."""

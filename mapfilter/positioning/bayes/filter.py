@@ -43,8 +43,7 @@ from mapfilter.positioning.epoch_checks import check_epoch
 from mapfilter.positioning.epochs import Epoch, serving_cell
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
-from mapfilter.positioning.gnss.source import FirstFix, GnssSource
-from mapfilter.positioning.gnss.state import GnssState
+from mapfilter.positioning.gnss.source import FirstFix, GnssSource, gnss_of
 from mapfilter.positioning.known_start import check_start
 from mapfilter.positioning.sensors.undirected import UndirectedWay
 from mapfilter.positioning.sensors.watch import SensorWatch
@@ -216,7 +215,7 @@ class BayesPositioner(Filter[BayesState]):
                 belief, status = report(before, state.belief, state.status)
                 if belief is not state.belief or status is not state.status:
                     state = replace(state, belief=belief, status=status)
-                positioned = _gnss_of(state).was_used(epoch.time_s)
+                positioned = gnss_of(state).was_used(epoch.time_s)
                 state = judged(self.beliefs, state, weighed=used, positioned=positioned)
         other_unit = state.hold.step_unit_m != hold.step_unit_m
         read_anew = state.hold != hold and not other_unit
@@ -229,7 +228,7 @@ class BayesPositioner(Filter[BayesState]):
             unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.PHONE_TURNED))
         elif other_unit:
             unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.OTHER_UNIT))
-        gnss = _gnss_of(state)
+        gnss = gnss_of(state)
         if epoch.fix is not None and gnss.was_used(epoch.time_s):
             state = replace(state, last_fix=epoch.fix)
         if gnss.was_used(epoch.time_s):
@@ -301,8 +300,3 @@ def _in_doubt(epoch: Epoch, unused: Sequence[UnusedReading]) -> list[UnusedReadi
     told = {(one.kind, one.what) for one in unused}
     why = Reason.REJECTED_BY_EVIDENCE
     return [UnusedReading(epoch.time_s, *one, why) for one in given if one not in told]
-
-
-def _gnss_of(state: BayesState) -> GnssState:
-    gnss: GnssState = state.sources[GnssSource.name]
-    return gnss

@@ -248,32 +248,19 @@ class _Move:
 
     def after(self, watch: SensorWatch) -> BayesState:
         """Return the state after the motion, with that of the sensors."""
-        state = self.state
-        return BayesState(
+        return replace(
+            self.state,
             belief=self.belief,
-            status=state.status,
-            contested=state.contested,
-            sources=state.sources,
             reckoning=self.reckoning,
             heading_rad=self.heading_rad,
             compass=self.compass,
-            null=state.null,
             alternative=self.alternative,
-            takeovers=state.takeovers,
             path=self.path,
-            reported=state.reported,
             watch=watch,
-            last_fix=state.last_fix,
-            recovery=state.recovery,
             twin=self.twin,
-            hold=state.hold,
             walking_rad=self.walking_rad,
             held=self.held,
-            alternatives=state.alternatives,
             unaided=self.unaided,
-            proven=state.proven,
-            alone_from_m=state.alone_from_m,
-            area=state.area,
         )
 
 

@@ -5,29 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import partial
-from math import radians
 from typing import Annotated, Any
 
 from annotated_types import Ge, Gt, Le
 
-from mapfilter._device import DeviceName, open_device
-from mapfilter._threads import Threads
+from mapfilter._device import PROCESSOR, Device, DeviceName, open_device
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults
-from mapfilter.filters.particle import ParticleOptions
-from mapfilter.models.level_errors import LevelErrors
-from mapfilter.models.street_motion import MotionErrors
-from mapfilter.models.way_map import MapWeights
 from mapfilter.options import Below1, NotNegative, Options, Positive, Probability
-from mapfilter.positioning.bayes.alternative import AlternativeRules
 from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.carriageways import carriageway_filters
-from mapfilter.positioning.bayes.evidence_options import EvidenceOptions
+from mapfilter.positioning.bayes.assembly import assembled
 from mapfilter.positioning.bayes.filter import BayesPositioner
-from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
 from mapfilter.positioning.bayes.maker import Maker, made_over_area
-from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.over_survey import (
     SURVEYED,
@@ -35,11 +25,6 @@ from mapfilter.positioning.bayes.over_survey import (
     filled_field,
     over_measured,
 )
-from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
-
-_SLOW, _FAST, _WHITE = 7.0, 4.0, 3.3
-_TOTAL_DB = (_SLOW**2 + _FAST**2 + _WHITE**2) ** 0.5
-_FAST_OF_SLOW_M = 0.1
 
 VEHICLE: Mapping[str, float] = {
     "step_sd_m": 0.05,
@@ -49,20 +34,6 @@ VEHICLE: Mapping[str, float] = {
     "off_cost_per_m": 0.15,
 }
 """Defaults of vehicles, where they differ."""
-_VEHICLE_MOTION: Mapping[str, float] = {
-    "disturbances_per_m": 0.0,
-    "remounts_per_m": 0.0,
-    "rate_rad_per_m": radians(0.01),
-    "stretch_sd": 0.02,
-    "corners_per_m": 1 / 20,
-}
-_VEHICLE_LEAVES_PER_M = 3e-4
-
-_MORE_BY_MAP = 3
-_LEAST_MASS_BY_MAP, _LEAST_HOLD_BY_MAP_M = 0.998, 200.0
-_CONVERGE_BY_MAP, _NATS_PER_M_BY_MAP = -8.0, 0.03
-"""Where the map alone is the evidence: factor of the numbers of particles; least mass and distance
-of the switch rule; largest log odds of the null hypothesis, its cost of a metre."""
 
 Particles = Annotated[int, Ge(10), Le(10_000_000)]
 
@@ -218,86 +189,11 @@ class BayesFilter(Options):
     def over_area(self, area: AreaFrame) -> BayesPositioner:
         """Return the filter over an area."""
         maker = Maker(self, partial(made_over_area, area))
-        return replace(self.resolved._over_area(area), maker=maker)
+        return replace(assembled(self.resolved, area), maker=maker)
 
-    def _over_area(self, area: AreaFrame) -> BayesPositioner:
-        motion = MotionErrors(
-            step_sd_m=self.step_sd_m,
-            heading_sd_rad=radians(self.heading_sd_deg),
-            bias_sd_rad=radians(self.bias_sd_deg),
-            bias_drift_rad_per_sqrt_m=radians(self.drift_deg_per_sqrt_m),
-            scale_sd=self.scale,
-        )
-        # Disturbances are part of the headings' errors: with small ones large jumps are rarer.
-        usual = MotionErrors()
-        times = motion.heading_sd_rad / usual.heading_sd_rad
-        motion = replace(motion, disturbances_per_m=times * usual.disturbances_per_m)
-        weights = MapWeights(self.map_sd_m, self.map_weight_per_m, self.off_cost_per_m)
-        if self.vehicle:
-            motion = replace(motion, **_VEHICLE_MOTION)
-            weights = replace(weights, leave_per_m=_VEHICLE_LEAVES_PER_M)
-        share = self.level_error_db / _TOTAL_DB
-        levels = LevelErrors(
-            slow_db=share * _SLOW,
-            slow_m=self.level_correlation_m,
-            fast_db=share * _FAST,
-            fast_m=_FAST_OF_SLOW_M * self.level_correlation_m,
-            white_db=share * _WHITE,
-            device_db=self.device_error_db,
-            fault_probability=self.fault_probability,
-            weight=self.level_weight,
-        )
-        evidence = EvidenceOptions(
-            levels=levels, spacing_m=self.report_spacing_m, use_levels=self.levels
-        )
-        particles = ParticleOptions(
-            max_particles=self.max_particles,
-            min_search_particles=self.min_search_particles,
-            min_particles=self.min_particles,
-            switch_mass=self.switch_mass,
-            switch_hold_m=self.switch_hold_m,
-        )
-        rules = AlternativeRules()
-        rules = replace(rules, claimed_from=min(rules.claimed_from, self.switch_mass))
-        positioned, carriageways = None, None
-        threads = Threads(self.threads)
-        model = BayesModel(area, motion, weights, evidence=evidence, threads=threads)
-        if not area.cell_ids:
-            positioned = particles, rules
-            rules = replace(
-                rules,
-                converge_log_odds=_CONVERGE_BY_MAP,
-                map_nats_per_m=_NATS_PER_M_BY_MAP,
-            )
-            particles = replace(
-                particles,
-                max_particles=_MORE_BY_MAP * self.max_particles,
-                min_search_particles=_MORE_BY_MAP * self.min_search_particles,
-                switch_mass=max(self.switch_mass, _LEAST_MASS_BY_MAP),
-                switch_hold_m=max(self.switch_hold_m, _LEAST_HOLD_BY_MAP_M),
-            )
-            if self.vehicle:
-                carriageways = carriageway_filters(model, particles, rules, positioned[0])
-        satellites = GnssOptions(
-            zenith_m=self.satellite_sd_m,
-            height_m=self.antenna_height_m,
-            height_sd_m=self.antenna_height_sd_m,
-        )
-        return BayesPositioner(
-            model,
-            particles,
-            rules,
-            grid=self.name == "grid",
-            satellites=satellites,
-            timing=TimingOptions(step_m=self.timing_step_m, advance_sd_m=self.timing_sd_m),
-            smooth=self.smooth,
-            positioned=positioned,
-            carriageways=carriageways,
-            # A vehicle's compass is screwed on; without cells any street may go straight on.
-            holds=HoldRules(watched=bool(area.cell_ids) and not self.vehicle),
-            # By ways alone a belief without positions goes astray sooner than they do.
-            pulls=PullRules(watched=bool(area.cell_ids)),
-        )
+    def opened_device(self) -> Device:
+        """Return the device that the filter computes on: the processor."""
+        return PROCESSOR
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,7 +219,12 @@ class GridFilter(BayesFilter):
         """The filter's name."""
         return "grid"
 
-    def _over_area(self, area: AreaFrame) -> BayesPositioner:
-        device = open_device(self.device, "filter.grid.device")
-        # Without arguments super() does not work in a dataclass with slots.
-        return replace(BayesFilter._over_area(self, area), device=device)
+    def opened_device(self) -> Device:
+        """Return the device that the filter computes on, as it is asked for.
+
+        Raises
+        ------
+        ConfigError
+            There is none, or what computes on it is not installed.
+        """
+        return open_device(self.device, "filter.grid.device")

@@ -5,8 +5,7 @@ from __future__ import annotations
 from math import inf
 
 from mapfilter.positioning.bayes.state import BayesState
-from mapfilter.positioning.gnss.source import GnssSource
-from mapfilter.positioning.gnss.state import GnssState
+from mapfilter.positioning.gnss.source import gnss_of
 from mapfilter.positioning.sensors.watch import SensorWatch
 
 
@@ -27,16 +26,11 @@ def rode(state: BayesState, watch: SensorWatch, time_s: float) -> bool:
         since_s = rest.since_s
     if watch.rode_unheard:
         since_s = min(since_s, state.watch.times.report_s)
-    return _compared_at_s(state) < since_s < inf
+    return gnss_of(state).compared_at_s < since_s < inf
 
 
 def rides_unheard(state: BayesState) -> bool:
     """Return whether one who hardly steps may have left, as nothing is heard any more."""
     watch = state.watch
     is_unheard = watch.is_unheard(state.hold.step_unit_m)
-    return is_unheard and _compared_at_s(state) < watch.times.report_s
-
-
-def _compared_at_s(state: BayesState) -> float:
-    gnss: GnssState = state.sources[GnssSource.name]
-    return gnss.compared_at_s
+    return is_unheard and gnss_of(state).compared_at_s < watch.times.report_s

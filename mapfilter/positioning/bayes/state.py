@@ -118,32 +118,7 @@ class BayesState:
 
     def with_output(self, reported: Reported) -> BayesState:
         """Return the state with its output."""
-        return BayesState(
-            belief=self.belief,
-            status=self.status,
-            contested=self.contested,
-            sources=self.sources,
-            reckoning=self.reckoning,
-            heading_rad=self.heading_rad,
-            compass=self.compass,
-            null=self.null,
-            alternative=self.alternative,
-            takeovers=self.takeovers,
-            path=self.path,
-            reported=reported,
-            watch=self.watch,
-            last_fix=self.last_fix,
-            recovery=self.recovery,
-            twin=self.twin,
-            hold=self.hold,
-            walking_rad=self.walking_rad,
-            held=self.held,
-            alternatives=self.alternatives,
-            unaided=self.unaided,
-            proven=self.proven,
-            alone_from_m=self.alone_from_m,
-            area=self.area,
-        )
+        return replace(self, reported=reported)
 
     def begun_anew(self) -> BayesState:
         """Return the state without its belief, of which nothing is left, or nothing is to be used.

@@ -145,7 +145,7 @@ class GnssSource(EvidenceSource):
 
     def update(self, state: BayesState, epoch: Epoch, context: Context) -> EvidenceUpdate:
         """Compare the epoch's fix and pseudoranges with the belief and the alternative."""
-        own: GnssState = state.sources[self.name]
+        own = gnss_of(state)
         if epoch.fix is None and not epoch.ranges:
             return EvidenceUpdate(own)
         travelled_m, belief = state.reckoning.travelled_m, state.belief
@@ -207,7 +207,7 @@ class GnssSource(EvidenceSource):
     ) -> GnssState:
         """Return the state with a fix in its trail, and beside the steps of one that moves."""
         own, rejected = found.state, found.unexplained
-        if time_s < state.sources[self.name].probation_until_s:
+        if time_s < gnss_of(state).probation_until_s:
             # It was not compared: it may agree with the belief.
             rejected = not agrees_with(found.belief, widened(fix, 1.0), self.gate.origin_m)
         least_s = self.options.dispute_s
@@ -241,3 +241,9 @@ class GnssSource(EvidenceSource):
         most = max(most, abs(alternative.gnss_log_bayes_factor))
         total = min(max(alternative.gnss_log_bayes_factor + step, -most), most)
         return replace(alternative, gnss_log_bayes_factor=total)
+
+
+def gnss_of(state: BayesState) -> GnssState:
+    """Return what a state holds of GNSS beside its main belief."""
+    found: GnssState = state.sources[GnssSource.name]
+    return found
