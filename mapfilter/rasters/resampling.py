@@ -82,7 +82,7 @@ def read_on(
     pixel that holds the centre of the one asked for; *bilinear* weighs the four nearest centres,
     in dB, without those that have no data, and has data where nearest has.
     """
-    if lattice is file.lattice or lattice == file.lattice:
+    if lattice == file.lattice:
         return file.read(bands, window)
     shift = _shift(file.lattice, lattice)
     if shift is not None:

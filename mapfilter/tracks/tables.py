@@ -130,7 +130,7 @@ def _check_technologies(radio: pd.DataFrame, found: TableFaults) -> None:
             if of.any() and name in radio:
                 value = radio[name].to_numpy(dtype=np.float64, na_value=np.nan)
                 hint = "metres for steps" if name == "timing_advance" else ""
-                column = Column(name, 0, most, f"0..{most} in {family}", hint)
+                column = Column(name, expected=f"0..{most} in {family}", hint=hint)
                 note_values(found, of & (value > most), column, radio[name])
 
 

@@ -223,6 +223,8 @@ def test_kernels_hold_constants_and_compiled_functions():
     assert inlined("A = 1\n\n\ndef f():\n    return 2\n") == [True, False]
     assert inlined("class A:\n    b = 1\n\n    def f(self):\n        return 2\n") == [True, False]
     assert inlined("from numba import njit\n\n\ndef f():\n    return 2\n") == [True]
+    # A decorator of another module may compile.
+    assert inlined("from a import kernel\n\n\n@kernel\ndef f():\n    return 2\n") == [True]
 
 
 def test_a_mutant_that_no_test_is_near_to_survives_and_nothing_is_run(toy):

@@ -32,6 +32,8 @@ LIBRARIES = (
 )  # fmt: skip
 """Loaded once, before any fork, by the process that the package's tests are forked from."""
 _NEVER_COPIED = ("__pycache__", "_build", ".hypothesis")
+_COMPILING = ("numba", "on_demand", "@kernel")
+"""Words of files whose functions are compiled; the last two call numba in another file."""
 _LATER_NS = 3_600_000_000_000
 """By how much a mutated file is newer: caches are asked for by the time of their file."""
 
@@ -191,9 +193,9 @@ class Workshop:
 def is_inlined(text: str, mutant: Mutant) -> bool:
     """Return whether kernels may hold what a mutant changes: constants and compiled functions.
 
-    Functions of a file without numba are compiled nowhere.
+    Functions of a file that names nothing that compiles are compiled nowhere.
     """
-    if "numba" in text or "on_demand" in text:
+    if any(word in text for word in _COMPILING):
         return True
     source = Source(text)
     functions = [node for node in ast.walk(source.tree) if isinstance(node, ast.FunctionDef)]

@@ -1,5 +1,7 @@
 """How far off satellites may be, by hand: deviations of 3 m, and nothing unknown but the clock."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,8 +11,9 @@ from mapfilter.filters.particle import ParticleBelief
 from mapfilter.geodesy import project
 from mapfilter.gnss.sky import GridFrame
 from mapfilter.models.street_motion import EAST, NORTH, STATES
+from mapfilter.positioning.bayes.evidence import FixedTerm
 from mapfilter.positioning.epochs import Epoch, Pseudorange
-from mapfilter.positioning.gnss.gate import GnssGate
+from mapfilter.positioning.gnss.gate import GnssComparison, GnssGate, _neutral
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.state import GnssState
 
@@ -93,3 +96,15 @@ def test_a_clock_that_is_known_explains_none(known, late_m, used):
     """Of six, two to either side; 14 is at the gate: 7.94 m."""
     both = left_out(late_m, -late_m, 0.0, 0.0, 0.0, 0.0, known=known)
     assert (both == []) is used
+
+
+def test_a_fix_and_pseudoranges_keep_the_sum_of_weights_that_steps_have_changed():
+    """Weights of 0.2 and 0.3; likelihoods of 2 and 1 by the fix, of 0.5 and 4 by pseudoranges.
+
+    0.2 · 1 + 0.3 · 4 are 2.8 times the sum of 0.5 before.
+    """
+    belief = replace(place(), state=np.zeros((STATES, 2), "f4"), log_weight=np.log([0.2, 0.3]))
+    terms = FixedTerm(np.log([2.0, 1.0])), FixedTerm(np.log([0.5, 4.0]))
+    fix, pseudoranges = _neutral(GnssComparison(belief, GnssState(), terms)).terms
+    assert fix == terms[0]
+    np.testing.assert_allclose(np.exp(pseudoranges.value), [0.5 / 2.8, 4 / 2.8], rtol=1e-12)

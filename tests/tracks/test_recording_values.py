@@ -130,6 +130,14 @@ def test_ephemerides_of_all_constellations_are_on_one_time(written):
     assert recording.notes == ("1 message of GLONASS, SBAS or NavIC is not used",)
 
 
+@pytest.mark.parametrize("coefficient", ["            ", "  4.657*D-09"])
+def test_an_ionosphere_of_which_a_coefficient_is_missing_is_none(written, coefficient):
+    text = MADE["rinex-nav/3"][1].replace("  4.6570D-09", coefficient)
+    recording = read_recording(written("rinex-nav/3", text))
+    assert set(recording.tables) == {"ephemerides"}
+    assert recording.unusable == ()
+
+
 def test_what_is_no_whole_number_is_missing(written):
     text = MADE["opencellid"][1]
     for i, word in enumerate(("1170250.0", "+1170250", "7.0.0", "1_0", "9" * 25)):
