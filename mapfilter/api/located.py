@@ -39,7 +39,7 @@ from mapfilter.positioning.log_lacks import (
 )
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
 from mapfilter.positioning.positioned_track import PositionedTrack
-from mapfilter.positioning.timing_steps import with_one_step
+from mapfilter.positioning.timing_steps import with_one_step, with_plan_technologies
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
@@ -229,7 +229,7 @@ def locate(
         faults = Faults()
         check_places("log", log, database.lattice, faults)
         faults.raise_if_any(InputError)
-    log = with_range_notes(name_by_plan(log, plan), plan)
+    log = with_plan_technologies(with_range_notes(name_by_plan(log, plan), plan), plan)
     made = given_filter if isinstance(given_filter, Filter) else None
     chosen = given_filter if made is None or made.made_of is None else made.made_of
     log = with_one_step(log, chosen)

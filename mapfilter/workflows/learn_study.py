@@ -35,7 +35,7 @@ from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.filter import Filter, FilterOptions
 from mapfilter.positioning.log_options import fitted_to_log
 from mapfilter.positioning.loop import locate
-from mapfilter.positioning.timing_steps import with_one_step
+from mapfilter.positioning.timing_steps import with_one_step, with_plan_technologies
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
@@ -279,6 +279,7 @@ def _opened(config: Config, paths: Sequence[Path], database: RadioRouteDatabase)
             continue
         log = in_frame(opened.log, database.lattice.crs)
         check_log(path, log, database.lattice, faults)
-        logs.append(replace(opened, log=name_by_plan(log, database.plan)))
+        log = with_plan_technologies(name_by_plan(log, database.plan), database.plan)
+        logs.append(replace(opened, log=log))
     faults.raise_if_any(InputError)
     return logs

@@ -32,7 +32,7 @@ from mapfilter.positioning.log_lacks import advice_of
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
 from mapfilter.positioning.loop import locate
 from mapfilter.positioning.positioned_track import PositionedTrack, Snapshot
-from mapfilter.positioning.timing_steps import with_one_step
+from mapfilter.positioning.timing_steps import with_one_step, with_plan_technologies
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.plan_notes import assumed_notes
@@ -154,7 +154,7 @@ def run_replay(
         name, crs = opened.name, opened.log.crs if database is None else database.lattice.crs
         log = leave_out(name_by_plan(opened.log, sites(crs)), config.track.without)
         log = with_range_notes(log, sites(crs)) if has_sites else without_cells(log, _SITES)
-        log = with_one_step(log, options)
+        log = with_one_step(with_plan_technologies(log, sites(crs)), options)
         fitted, notes = fitted_to_log(options, log)
         notes = (*notes, *(sites(crs).notes if database is None else assumed_notes(database.plan)))
         if database is not None and by_streets_alone(fitted, log, database):
