@@ -83,9 +83,9 @@ class Truth:
         """Return the true distance travelled since the start, interpolated to other times.
 
         The legs of the record are added up. Where more than a tenth of them turn back on the one
-        before within 10 s, as those of a receiver's positions with noise do, only places more than six standard
-        deviations of the noise apart count, so that a rest adds nothing; the sum is then within
-        some 10 % of the way.
+        before within 10 s, as those of a receiver's positions with noise do, only places more than
+        six standard deviations of the noise apart count, so that a rest adds nothing; the sum is
+        then within some 10 % of the way.
 
         Examples
         --------

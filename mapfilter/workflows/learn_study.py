@@ -40,7 +40,6 @@ from mapfilter.propagation.shadowing import named_rng
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenedLog
-from mapfilter.tracks.placeless import in_frame
 from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.learn_key import study_key
 from mapfilter.workflows.learn_lacks import log_notes, unused_notes
@@ -271,15 +270,14 @@ def _opened(config: Config, paths: Sequence[Path], database: RadioRouteDatabase)
     faults, logs = Faults(), list[OpenedLog]()
     for path in paths:
         try:
-            opened = open_journey(config, path, database.lattice.crs)
+            opened = open_journey(config, path, database.lattice)
         except ConfigError:
             raise
         except MapfilterError as error:
             faults.take(error)
             continue
-        log = in_frame(opened.log, database.lattice.crs)
-        check_log(path, log, database.lattice, faults)
-        log = with_plan_technologies(name_by_plan(log, database.plan), database.plan)
+        check_log(path, opened.log, database.lattice, faults)
+        log = with_plan_technologies(name_by_plan(opened.log, database.plan), database.plan)
         logs.append(replace(opened, log=log))
     faults.raise_if_any(InputError)
     return logs
