@@ -13,7 +13,7 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import same_crs, short_crs
+from mapfilter.geodesy import same_crs, short_crs, unproject
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +99,13 @@ class Lattice:
     def gdal_transform(self) -> tuple[float, float, float, float, float, float]:
         """Six numbers in GDAL's order: west, pixel width, 0, north, 0, -pixel height."""
         return (self.west_m, self.resolution_m, 0.0, self.north_m, 0.0, -self.resolution_m)
+
+    @property
+    def middle_deg(self) -> tuple[float, float]:
+        """Latitude and longitude of the middle, WGS 84."""
+        west, south, east, north = self.bounds_m
+        lon_deg, lat_deg = unproject(self.crs, (west + east) / 2, (south + north) / 2)
+        return float(lat_deg), float(lon_deg)
 
     def east_north(self, row: Any, col: Any) -> Any:
         """Return the centres of pixels as (east_m, north_m), scalars or arrays."""

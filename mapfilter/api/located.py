@@ -15,7 +15,7 @@ import pandas as pd
 from mapfilter._arguments import Entries, Setting, check_arguments, generator
 from mapfilter._words import number_of
 from mapfilter.api.given import log_argument, opened, optional_database
-from mapfilter.api.mapless import over_sites, own_sites, without_sites
+from mapfilter.api.mapless import middle_of_sites, over_sites, own_sites, without_sites
 from mapfilter.api.motion import with_right_motion
 from mapfilter.api.python_words import python_words
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -39,7 +39,7 @@ from mapfilter.positioning.log_lacks import (
 )
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
 from mapfilter.positioning.positioned_track import PositionedTrack
-from mapfilter.positioning.timing_steps import with_one_step
+from mapfilter.positioning.timing_steps import with_one_step, with_plan_technologies
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
@@ -220,16 +220,17 @@ def locate(
     given_filter = filter_options(filter) if isinstance(filter, str) else filter
     database = None if database is None else opened(database)
     plan = own_sites(given_filter) if database is None else database.plan
-    log = with_right_motion(log, plan.crs if plan is not None else "", factors or {})
+    about_deg = middle_of_sites(plan) if database is None else database.lattice.middle_deg
+    log = with_right_motion(log, "" if plan is None else plan.crs, about_deg, factors or {})
     if plan is None:
         log, plan = without_sites(log), CellPlan(log.crs, ())
     else:
-        log = in_frame(log, plan.crs)
+        log = in_frame(log, plan.crs, about_deg)
     if database is not None:
         faults = Faults()
         check_places("log", log, database.lattice, faults)
         faults.raise_if_any(InputError)
-    log = with_range_notes(name_by_plan(log, plan), plan)
+    log = with_plan_technologies(with_range_notes(name_by_plan(log, plan), plan), plan)
     made = given_filter if isinstance(given_filter, Filter) else None
     chosen = given_filter if made is None or made.made_of is None else made.made_of
     log = with_one_step(log, chosen)

@@ -118,6 +118,24 @@ def read_log(
     return open_log(given, crs=crs, options=options).log
 
 
+@python_log
+def read_log_of_area(
+    path: str | Path, crs: str, about_deg: tuple[float, float], factors: Mapping[str, float]
+) -> TrackLog:
+    """Read a log, or recordings, whose headings have to fit an area.
+
+    Parameters
+    ----------
+    path : path
+    crs, about_deg
+        Of the area: its CRS, and a latitude and longitude in it.
+    factors : mapping of str to float
+        As of :func:`read_log`.
+    """
+    combine = CombineOptions(about_deg=about_deg, factors=factors)
+    return open_log(path, crs=crs, options=OpenOptions(combine=combine)).log
+
+
 def _origin(given: object, faults: Faults) -> tuple[float, float] | None:
     """Return the origin of a local frame; None without one, or with faults."""
     if given is None:

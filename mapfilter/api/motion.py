@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from mapfilter.api.logs import read_log
+from mapfilter.api.logs import read_log, read_log_of_area
 from mapfilter.errors import ConfigError, Faults, InputError
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.motion_factors import check_factors, scaled_log
@@ -14,7 +14,10 @@ from mapfilter.tracks.refused_motion import AS_HEADING, note_refused
 
 
 def with_right_motion(
-    log: TrackLog | Path | str, crs: str, factors: Mapping[str, float]
+    log: TrackLog | Path | str,
+    crs: str,
+    about_deg: tuple[float, float] | None,
+    factors: Mapping[str, float],
 ) -> TrackLog:
     """Return a log with its motion times factors, read where it is a path.
 
@@ -23,6 +26,8 @@ def with_right_motion(
     log : TrackLog or path
     crs : str
         In which recordings are read.
+    about_deg : (float, float) or None
+        Latitude and longitude of the area, for recordings without positions.
     factors : mapping of str to float
         By column of motion. One of 1 takes a column as it is.
 
@@ -40,7 +45,11 @@ def with_right_motion(
     if isinstance(log, TrackLog):
         where, log = "log", scaled_log(log, factors, "log")
     else:
-        where, log = str(log), read_log(log, crs=crs, factors=factors)
+        where = str(log)
+        if about_deg is None:
+            log = read_log(log, crs=crs, factors=factors)
+        else:
+            log = read_log_of_area(log, crs, about_deg, factors)
     note_refused(log, factors, where, _mends, faults)
     faults.raise_if_any(InputError)
     return log

@@ -8,8 +8,46 @@ from typing import Any
 import pandas as pd
 
 from mapfilter.positioning.log_options import has_default
+from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.identities import TIMING_STEP_M
 from mapfilter.tracks.log import TrackLog
+
+
+def with_plan_technologies(log: TrackLog, plan: CellPlan) -> TrackLog:
+    """Return a log whose timing advances have the technologies of their cells, where it has none.
+
+    Parameters
+    ----------
+    log : TrackLog
+        Its cells have the ids of the plan.
+    plan : CellPlan
+        Of its cells those with a technology count.
+
+    Returns
+    -------
+    TrackLog
+        The same object where nothing changes.
+
+    Examples
+    --------
+    >>> from mapfilter.radio.cells import Cell
+    >>> from mapfilter.tracks.log import make_log
+    >>> cell = Cell("A", "A", 0.0, 0.0, 30.0, None, 30.0, 1800.0, "omni", technology="LTE")
+    >>> radio = pd.DataFrame({"time_s": [0.0], "role": "serving", "cell": "A"})
+    >>> log = make_log("EPSG:32635", radio=radio.assign(timing_advance=7))
+    >>> with_plan_technologies(log, CellPlan(log.crs, (cell,))).radio["technology"].tolist()
+    ['LTE']
+    """
+    rows = log.radio
+    known = {cell.id: cell.technology for cell in plan.cells if cell.technology is not None}
+    lacks = rows["timing_advance"].notna() & rows["cell"].isin(known)
+    if "technology" in rows:
+        lacks &= rows["technology"].isna()
+    if not lacks.any():
+        return log
+    given = rows.get("technology", pd.Series(None, index=rows.index, dtype=object))
+    named = given.astype(object).mask(lacks, rows["cell"].map(known))
+    return replace(log, radio=rows.assign(technology=named))
 
 
 def with_one_step(log: TrackLog, options: Any) -> TrackLog:

@@ -70,7 +70,7 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         later(recording, offset)
         for recording, offset in zip(journey, alignment.offsets_s, strict=True)
     ]
-    frame = Frame(shifted, options.crs, options.origin_deg)
+    frame = Frame(shifted, options.crs, options.origin_deg, options.about_deg)
     shifted, beyond = within_crs(shifted, frame.crs, frame.local)
     notes = [*alignment.notes, *frame.notes, *beyond]
     for one in shifted:

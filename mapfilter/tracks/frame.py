@@ -22,7 +22,11 @@ class Frame:
     """The CRS of the log, and how positions of recordings come into it."""
 
     def __init__(
-        self, recordings: Sequence[Recording], crs: str, origin_deg: tuple[float, float] | None
+        self,
+        recordings: Sequence[Recording],
+        crs: str,
+        origin_deg: tuple[float, float] | None,
+        about_deg: tuple[float, float] | None = None,
     ) -> None:
         self.notes: list[str] = []
         self.local = ""
@@ -63,6 +67,8 @@ class Frame:
             self.notes.append("no positions: the CRS of the log is a local frame")
         if (crs or stated) and not np.isfinite(self.lat_deg):
             self.lat_deg, self.lon_deg = self._middle_deg(recordings)
+        if crs and not np.isfinite(self.lat_deg) and about_deg is not None:
+            self.lat_deg, self.lon_deg = about_deg
         if own and places and origin_deg is None and not crs:
             names = ", ".join(r.path.name for r in own)
             expected = "one frame of positions"

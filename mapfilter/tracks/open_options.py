@@ -21,6 +21,9 @@ class CombineOptions:
         Projected CRS of the log; "" for the UTM zone of its positions.
     origin_deg : (float, float) or None
         Latitude and longitude at which a local frame of metres has its origin.
+    about_deg : (float, float) or None
+        Latitude and longitude of the area, whose grid convergence turns azimuths of recordings
+        without positions.
     truth : collection of Path
         Recordings whose positions are the truth, and no measurements.
     measured : collection of Path
@@ -39,6 +42,7 @@ class CombineOptions:
 
     crs: str = ""
     origin_deg: tuple[float, float] | None = None
+    about_deg: tuple[float, float] | None = None
     truth: Collection[Path] = ()
     measured: Collection[Path] = ()
     offsets_s: Mapping[Path, float] = field(default_factory=dict)

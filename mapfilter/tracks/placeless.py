@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 from pyproj import CRS
 
-from mapfilter.geodesy import short_crs
+from mapfilter.geodesy import grid_convergence_rad, short_crs, wrap_rad
 from mapfilter.tracks.log import TrackLog
 
 LOCAL_FRAME = "a local frame"
@@ -32,12 +33,24 @@ def is_local_frame(crs: str) -> bool:
     return bool(origin) and not any(origin)
 
 
-def in_frame(log: TrackLog, crs: str) -> TrackLog:
+def in_frame(log: TrackLog, crs: str, about_deg: tuple[float, float] | None = None) -> TrackLog:
     """Return a log that names no CRS and holds no positions as one in ``crs``.
 
-    Its headings then are relative to that grid's north. Other logs are returned as they are.
+    Other logs are returned as they are.
+
+    Parameters
+    ----------
+    about_deg : (float, float) or None
+        Latitude and longitude of the area. North of a local frame is true north, from which
+        headings are turned to that of ``crs`` there; None leaves them as they are.
     """
     if not is_local_frame(log.crs) or not (log.truth.empty and log.gnss.empty):
         return log
     note = f"no positions in the log: taken to be in {short_crs(crs)}"
-    return replace(log, crs=crs, notes=(*log.notes, note))
+    motion = log.motion
+    if about_deg is not None and motion["heading_rad"].notna().any():
+        turned_rad = grid_convergence_rad(crs, about_deg[1], about_deg[0])
+        motion = motion.assign(heading_rad=wrap_rad(motion["heading_rad"] + turned_rad))
+        angle = f"{abs(np.degrees(turned_rad)):.1f} degrees"
+        note += f", headings by its grid convergence there, {angle}"
+    return replace(log, crs=crs, motion=motion, notes=(*log.notes, note))

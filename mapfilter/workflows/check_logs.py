@@ -17,7 +17,7 @@ from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.misplaced import AWAY_M
 from mapfilter.tracks.motion_fault import fault_notes
 from mapfilter.tracks.open_log import OpenedLog
-from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, in_frame, is_local_frame
+from mapfilter.tracks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
 from mapfilter.tracks.range_units import range_notes
 from mapfilter.tracks.refused_motion import mirrored_notes, refused_faults
 from mapfilter.tracks.rounded_degrees import rounded_notes
@@ -42,7 +42,7 @@ def check_logs(
         return
     for path in paths:
         try:
-            opened = open_journey(config, path, "" if lattice is None else lattice.crs)
+            opened = open_journey(config, path, lattice)
         except MapfilterError as error:
             findings.add_faults(error, "log-invalid")
             continue
@@ -62,7 +62,7 @@ def check_logs(
         in_doubt = all(one is None for one in whose) and not fault_notes(opened.log.notes, "step_m")
         if in_doubt and (fault := speed_fault(opened.log.motion)):
             findings.add("log-speeds", str(path), f"Motion: {fault}.", "warning")
-        log = opened.log if lattice is None else in_frame(opened.log, lattice.crs)
+        log = opened.log
         near = lattice is not None and _is_near(path, log, lattice, findings)
         # Motion without any reports is located by the streets alone.
         if near and plan and (len(log.radio) or log.motion.empty):

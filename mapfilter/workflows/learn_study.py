@@ -35,12 +35,11 @@ from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.filter import Filter, FilterOptions
 from mapfilter.positioning.log_options import fitted_to_log
 from mapfilter.positioning.loop import locate
-from mapfilter.positioning.timing_steps import with_one_step
+from mapfilter.positioning.timing_steps import with_one_step, with_plan_technologies
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenedLog
-from mapfilter.tracks.placeless import in_frame
 from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.learn_key import study_key
 from mapfilter.workflows.learn_lacks import log_notes, unused_notes
@@ -271,14 +270,14 @@ def _opened(config: Config, paths: Sequence[Path], database: RadioRouteDatabase)
     faults, logs = Faults(), list[OpenedLog]()
     for path in paths:
         try:
-            opened = open_journey(config, path, database.lattice.crs)
+            opened = open_journey(config, path, database.lattice)
         except ConfigError:
             raise
         except MapfilterError as error:
             faults.take(error)
             continue
-        log = in_frame(opened.log, database.lattice.crs)
-        check_log(path, log, database.lattice, faults)
-        logs.append(replace(opened, log=name_by_plan(log, database.plan)))
+        check_log(path, opened.log, database.lattice, faults)
+        log = with_plan_technologies(name_by_plan(opened.log, database.plan), database.plan)
+        logs.append(replace(opened, log=log))
     faults.raise_if_any(InputError)
     return logs

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from mapfilter.config.sections import Config
 from mapfilter.config.track import Track
 from mapfilter.geodesy import projected_crs
+from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.open_log import OpenedLog, list_journeys, open_log
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.pdr.options import WalkOptions
+from mapfilter.tracks.placeless import in_frame
 
 
 def open_options(track: Track) -> OpenOptions:
@@ -38,18 +41,27 @@ def journeys_of(config: Config) -> list[Path]:
 
 
 def open_journey(
-    config: Config, path: Path, crs: str = "", plan: CellPlan | None = None
+    config: Config, path: Path, area: Lattice | None = None, plan: CellPlan | None = None
 ) -> OpenedLog:
     """Open a journey, with the recordings that the section adds to it.
 
     Parameters
     ----------
-    crs : str
-        Of the database, for recordings; else that of the area, else the UTM zone of positions.
+    area : Lattice, optional
+        Of the database, whose CRS recordings have; else that of the configuration's area, else the
+        UTM zone of positions. A log without a CRS and positions is one of it.
     plan : CellPlan, optional
         Gives reported cells its ids.
     """
-    if not crs and config.area.crs is not None:
+    options = open_options(config.track)
+    crs = "" if area is None else area.crs
+    if area is not None:
+        combine = replace(options.combine, about_deg=area.middle_deg)
+        options = replace(options, combine=combine)
+    elif config.area.crs is not None:
         crs = projected_crs(config.area.crs, "area.crs")
     paths = [path, *config.track.recordings]
-    return open_log(paths, crs=crs, plan=plan, options=open_options(config.track))
+    opened = open_log(paths, crs=crs, plan=plan, options=options)
+    if area is None:
+        return opened
+    return replace(opened, log=in_frame(opened.log, area.crs, area.middle_deg))

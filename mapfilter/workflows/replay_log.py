@@ -23,7 +23,7 @@ from mapfilter.positioning.log_lacks import advice_of
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
 from mapfilter.positioning.loop import locate
 from mapfilter.positioning.positioned_track import PositionedTrack, Snapshot
-from mapfilter.positioning.timing_steps import with_one_step
+from mapfilter.positioning.timing_steps import with_one_step, with_plan_technologies
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.plan_notes import assumed_notes
 from mapfilter.report.ground import BaseMap
@@ -164,7 +164,7 @@ class LogReplay:
         plan = filters.plan(crs)
         log = leave_out(name_by_plan(opened.log, plan), self.config.track.without)
         log = with_range_notes(log, plan) if filters.has_sites else without_cells(log, _SITES)
-        log = with_one_step(log, self.options)
+        log = with_one_step(with_plan_technologies(log, plan), self.options)
         fitted, notes = fitted_to_log(self.options, log)
         notes = (*notes, *(plan.notes if database is None else assumed_notes(database.plan)))
         by_streets = database is not None and by_streets_alone(fitted, log, database)

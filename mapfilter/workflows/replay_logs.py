@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from mapfilter._inputs import path_fault, shown
@@ -14,7 +13,6 @@ from mapfilter.positioning.kalman.siteless import needs_sites
 from mapfilter.tracks.kinds import leave_out
 from mapfilter.tracks.motion_fault import MotionFault
 from mapfilter.tracks.open_log import OpenedLog
-from mapfilter.tracks.placeless import in_frame
 from mapfilter.tracks.refused_motion import AS_HEADING, note_refused
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.sensors import MOTION_TABLES
@@ -36,7 +34,7 @@ class ReplayLogs:
 
     def __init__(self, config: Config, database: RadioRouteDatabase | None) -> None:
         self.config, self.paths = config, journeys_of(config)
-        self._crs = "" if database is None else database.lattice.crs
+        self._area = None if database is None else database.lattice
         self._kept: dict[Path, OpenedLog] = {}
         self._left_rows = _MOST_KEPT_ROWS
 
@@ -44,9 +42,7 @@ class ReplayLogs:
         """Return a log in the database's frame: one that is kept, or read again."""
         if path in self._kept:
             return self._kept[path]
-        opened = open_journey(self.config, path, self._crs)
-        if self._crs:
-            opened = replace(opened, log=in_frame(opened.log, self._crs))
+        opened = open_journey(self.config, path, self._area)
         tables = [getattr(opened.log, table) for table in TABLES]
         rows = sum(map(len, (*tables, *opened.sensors.values())))
         if opened.recordings or rows <= self._left_rows:

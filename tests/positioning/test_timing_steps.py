@@ -6,7 +6,7 @@ import pytest
 
 import mapfilter as mf
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.timing_steps import with_one_step
+from mapfilter.positioning.timing_steps import with_one_step, with_plan_technologies
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.tracks.log import make_log
 
@@ -90,3 +90,38 @@ def test_a_phone_of_two_networks_is_located_as_by_the_timing_advances_of_one():
     for track in (both, one):
         last = track.to_dataframe().iloc[-1]
         assert np.hypot(last["east_m"] - HERE[0], last["north_m"] - HERE[1]) < 200
+
+
+def lte_plan(**technology_of):
+    cells = (
+        Cell(name, name, *place, 30.0, None, 30.0, 1800.0, "omni",
+             technology=technology_of.get(name, "LTE"))
+        for name, place in SITES.items()
+    )  # fmt: skip
+    return CellPlan(CRS, tuple(cells))
+
+
+def test_timing_advances_without_a_technology_are_in_steps_of_the_plans_cells():
+    rows = [
+        {"time_s": float(second), "role": "serving", "cell": name,
+         "timing_advance": int(np.hypot(*np.subtract(HERE, place)) / LTE_M)}
+        for second in range(40)
+        for name, place in SITES.items()
+    ]  # fmt: skip
+    motion = pd.DataFrame({"time_s": np.arange(40.0), "step_m": 0.0, "heading_rad": 0.0})
+    given = make_log(CRS, radio=pd.DataFrame(rows), motion=motion)
+    track = mf.locate(given, filter=mf.KalmanFilter().over_sites(lte_plan()), seed=0)
+    last = track.to_dataframe().iloc[-1]
+    assert np.hypot(last["east_m"] - HERE[0], last["north_m"] - HERE[1]) < 200
+    assert "timing advance: steps of 78.07 m, by technology" in track.log.notes
+
+
+def test_what_a_report_states_goes_before_the_plan():
+    given = log(["GSM", None, None, None], (7, 9, 1, None), cell=["A", "A", "C", "A"])
+    found = with_plan_technologies(given, lte_plan(C=None)).radio["technology"]
+    assert found.astype(object).where(found.notna(), None).tolist() == ["GSM", "LTE", None, None]
+
+
+def test_a_log_stays_as_it_is_where_the_plan_tells_no_technology():
+    given = log(None, (7, None, 1, 2), cell=["C", "A", "C", "elsewhere"])
+    assert with_plan_technologies(given, lte_plan(C=None)) is given

@@ -195,6 +195,18 @@ def test_replay_needs_a_plan_and_no_map(tmp_path):
     assert json.loads(done.stdout.splitlines()[-1])["error_mean_m"] < told["error_mean_m"]
 
 
+def test_timing_advances_are_in_steps_of_the_technology_that_the_plan_states(tmp_path):
+    log, _ = walk(gnss=True, steps=10)
+    write_log(log, tmp_path / "walk")
+    rows = PLAN_CSV.replace("antenna\n", "antenna,technology\n").replace(",omni\n", ",omni,LTE\n")
+    (tmp_path / "cells.csv").write_text(rows.replace(",55,", ",25,"), encoding="utf-8")
+    words = ["replay", "--filter", "ekf", "--log", str(tmp_path / "walk"), "--json"]
+    words += ["--set", f"cells.plan={tmp_path / 'cells.csv'}", "--out", str(tmp_path / "out")]
+    done = CliRunner().invoke(app, words, catch_exceptions=False)
+    notes = json.loads(done.stdout.splitlines()[-1])["notes"]
+    assert "timing advance: steps of 78.07 m, by technology" in notes
+
+
 def test_fixes_and_steps_are_replayed_without_the_sites_of_the_cells(tmp_path):
     log, _ = walk(motion=True, gnss=True)
     write_log(log, tmp_path / "walk")

@@ -10,6 +10,8 @@ from made_phone import Leg, walk_sensors
 
 import mapfilter as mf
 from mapfilter.config.load import load_config
+from mapfilter.geodesy import project
+from mapfilter.lattice import Lattice
 from mapfilter.tracks.sensors import read_sensors
 from mapfilter.workflows.logs import open_journey
 
@@ -206,7 +208,9 @@ def test_a_configuration_and_python_take_the_same_options(recording, tmp_path):
     """
     (tmp_path / "walk.toml").write_text(text)
     config = load_config(tmp_path / "walk.toml")
-    opened = open_journey(config, recording, crs="EPSG:32635")
+    east, north = map(float, project("EPSG:32635", 24.94, 60.17))
+    area = Lattice("EPSG:32635", east - 500.0, north + 500.0, 5.0, 200, 200)
+    opened = open_journey(config, recording, area)
     options = mf.WalkOptions(declination_deg=10.0, step_factor=0.5)
     log = mf.read_log(recording, crs="EPSG:32635", walk=options)
     assert log.imu == opened.log.imu
@@ -214,6 +218,11 @@ def test_a_configuration_and_python_take_the_same_options(recording, tmp_path):
     # Without an origin the place, and with it the convergence, is unknown.
     apart = (headings_deg(opened.log) - headings_deg(log) + 180) % 360 - 180
     np.testing.assert_allclose(apart, -1.8, atol=0.1)
+    # That of an area is known.
+    text = text.replace("origin = [24.94, 60.17]", "")
+    (tmp_path / "walk.toml").write_text(text)
+    placed = open_journey(load_config(tmp_path / "walk.toml"), recording, area)
+    np.testing.assert_allclose(headings_deg(placed.log), headings_deg(opened.log), atol=1e-6)
     without = load_config(tmp_path / "walk.toml", ["track.steps=false"])
-    assert open_journey(without, recording, crs="EPSG:32635").log.motion.empty
+    assert open_journey(without, recording, area).log.motion.empty
     assert mf.read_log(recording, walk=None).motion.empty

@@ -91,9 +91,9 @@ def test_small_logs_are_read_once_and_large_ones_again(
 ):
     read, open_journey = [], replay_logs.open_journey
 
-    def counted(config, path, crs):
+    def counted(config, path, area):
         read.append(path)
-        return open_journey(config, path, crs)
+        return open_journey(config, path, area)
 
     monkeypatch.setattr(replay_logs, "open_journey", counted)
     monkeypatch.setattr(replay_logs, "_MOST_KEPT_ROWS", kept_rows)
