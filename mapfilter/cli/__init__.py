@@ -17,7 +17,8 @@ from mapfilter._kernel_cache import keep_kernels
 from mapfilter._memory import keep_freed_memory, search_cycles_rarely
 from mapfilter.cli.convert import convert
 from mapfilter.cli.databases import bound, build, check, export, info, merge, predict
-from mapfilter.cli.experiments import bench, evaluate, reproduce, sweep
+from mapfilter.cli.evaluate import evaluate
+from mapfilter.cli.experiments import bench, reproduce, sweep
 from mapfilter.cli.learning import learn
 from mapfilter.cli.options import DONE
 from mapfilter.cli.serving import serve

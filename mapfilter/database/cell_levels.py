@@ -40,6 +40,11 @@ class CellLevels(NamedTuple):
     point: Ints32
     level_dbm: Floats32
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of both arrays."""
+        return self.point.nbytes + self.level_dbm.nbytes
+
 
 def received_cells(database: RadioRouteDatabase) -> tuple[str, ...]:
     """Return the cells with a level somewhere, in the plan's order."""
@@ -133,6 +138,15 @@ class NearestPoints:
     best_dbm: Floats32
     second_dbm: Floats32
     edge_m: Floats32
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays."""
+        arrays = (
+            *(self.near, self.point, self.way_id),
+            *(self.best_dbm, self.second_dbm, self.edge_m),
+        )
+        return sum(one.nbytes for one in arrays)
 
 
 class PointReader:

@@ -46,7 +46,7 @@ from mapfilter.simulation.worlds.radio import planners_offsets_db
 from mapfilter.simulation.worlds.sensor_faults import NO_FAULT
 from mapfilter.simulation.worlds.street_lines import StreetLines
 from mapfilter.tracks.store import write_log
-from mapfilter.workflows.evaluate import TABLE, EvaluateResult
+from mapfilter.workflows.evaluate import TABLE, EvaluateResult, check_names
 from mapfilter.workflows.evaluate_runs import run_cases, street_base
 from mapfilter.workflows.evaluate_settings import load_benchmark
 from mapfilter.workflows.filter_choice import filter_choice
@@ -132,7 +132,7 @@ def run_foreign(
         The map, the box or a case is wrong, or the output cannot be written.
     """
     began_s = time.perf_counter()
-    wanted = _check_cases(world, cases)
+    wanted = check_names(cases, CASES_OF[world]) or tuple(CASES_OF[world])
     choice = filter_choice(config.filter)
     ensure_writable_folder(out)
     area = World.of(config)
@@ -155,15 +155,6 @@ def run_foreign(
     result = EvaluateResult(name, seed, points, tuple(found), seconds, out)
     write_json(out / TABLE, to_jsonable(result))
     return result
-
-
-def _check_cases(world: OtherWorld, names: Sequence[str]) -> tuple[str, ...]:
-    known, faults = CASES_OF[world], Faults()
-    for name in names:
-        if name not in known:
-            faults.add("--case", ", ".join(known), repr(name))
-    faults.raise_if_any(ConfigError)
-    return tuple(dict.fromkeys(names)) or tuple(known)
 
 
 def prepare(

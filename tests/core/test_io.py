@@ -8,25 +8,12 @@ import subprocess
 import sys
 
 import pytest
+from folders import names, read_folder, write_folder
 
 from mapfilter import _replace
 from mapfilter._io import atomic_dir, atomic_file, ensure_writable_folder, left_aside, sha256_file
 from mapfilter._json_files import read_json, write_json
 from mapfilter.errors import OutputError, StoreError
-
-
-def names(folder):
-    return sorted(path.name for path in folder.iterdir())
-
-
-def write_folder(path, text):
-    with atomic_dir(path) as folder:
-        (folder / "deep").mkdir()
-        (folder / "deep" / "part").write_text(text)
-
-
-def read_folder(path):
-    return {str(p.relative_to(path)): p.read_text() for p in path.rglob("*") if p.is_file()}
 
 
 def test_sha256_of_a_file_longer_than_one_chunk(tmp_path):

@@ -9,25 +9,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from folders import names, read_folder, write_folder
 
 from mapfilter import _io, _replace
 from mapfilter._io import atomic_dir, atomic_file, replaced_files
 from mapfilter._json_files import check_replaceable, check_version, sealed
 from mapfilter.errors import OutputError, StoreError
-
-
-def names(folder):
-    return sorted(path.name for path in folder.iterdir())
-
-
-def write_folder(path, text):
-    with atomic_dir(path) as folder:
-        (folder / "deep").mkdir()
-        (folder / "deep" / "part").write_text(text)
-
-
-def read_folder(path):
-    return {str(p.relative_to(path)): p.read_text() for p in path.rglob("*") if p.is_file()}
 
 
 def told(path, write):

@@ -12,11 +12,12 @@ from threading import Event
 import numpy as np
 import pytest
 import shapely
+from counting import Counting
 from killed_worker import KillsOneWorker
 from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_plan, make_routes
 
 from mapfilter._cluster import cluster_executor
-from mapfilter._parallel import SerialExecutor, local_executor
+from mapfilter._parallel import local_executor
 from mapfilter.database import store
 from mapfilter.database.build import build
 from mapfilter.database.estimate import dry_run
@@ -46,19 +47,6 @@ def again(world, out, **more):
     # A tile a task, so that counting tasks counts tiles.
     given = {**OPTIONS, "pixels_a_task": 0, **more}
     return build(world.rasters, world.plan, world.routes, out, **given)
-
-
-class Counting(SerialExecutor):
-    """Counts tasks, and is interrupted at one of them."""
-
-    def __init__(self, last=10**9):
-        self.tasks, self.last = 0, last
-
-    def submit(self, fn, /, *args, **kwargs):
-        self.tasks += 1
-        if self.tasks > self.last:
-            raise KeyboardInterrupt
-        return super().submit(fn, *args, **kwargs)
 
 
 def interrupted(world, out, after):

@@ -9,10 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import shapely
+from counting import Counting
 from small_world import CRS, FLOOR_DBM, LATTICE, levels_of, make_plan, make_routes
 
 from mapfilter import _resume
-from mapfilter._parallel import SerialExecutor
 from mapfilter._resume import FinishedParts
 from mapfilter.database.build import build, work_key
 from mapfilter.database.sources import LatticeRoutes, LayerRoutes
@@ -25,19 +25,6 @@ from mapfilter.roads.route_points import RouteSource
 from mapfilter.roads.ways import Squares, Ways
 
 FINISHED = 3
-
-
-class Counting(SerialExecutor):
-    """Counts the tiles that are made, and is interrupted at one of them."""
-
-    def __init__(self, last=10**9):
-        self.tasks, self.last = 0, last
-
-    def submit(self, fn, /, *args, **kwargs):
-        self.tasks += 1
-        if self.tasks > self.last:
-            raise KeyboardInterrupt
-        return super().submit(fn, *args, **kwargs)
 
 
 def written(folder, seed):

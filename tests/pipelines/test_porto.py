@@ -2,29 +2,14 @@
 
 from __future__ import annotations
 
-import json
-import runpy
-import sys
 from pathlib import Path
 
 import pytest
+from pipeline_scripts import run_script
 
-PIPELINES = Path(__file__).resolve().parents[2] / "pipelines"
 ROUTES, DRAWS = 40, 1
 """The paper has 100 runs. Routes differ more than draws do: a share of success has a deviation of
 0.065 to 0.075 by one draw (binomial), of 0.06 by two and of 0.05 by five."""
-
-
-def run_script(name: str, capsys: pytest.CaptureFixture[str], *settings: str) -> dict:
-    argv, sys.argv = sys.argv, [name, "--json", *settings]
-    try:
-        with pytest.raises(SystemExit) as ended:
-            runpy.run_path(str(PIPELINES / f"{name}.py"), run_name="__main__")
-    finally:
-        sys.argv = argv
-    out = capsys.readouterr()
-    assert ended.value.code == 0, out.err
-    return json.loads(out.out.splitlines()[-1])
 
 
 @pytest.fixture(scope="module")

@@ -2,30 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import re
-import runpy
-import sys
 from pathlib import Path
 
 import pytest
+from pipeline_scripts import PIPELINES, run_script
 
 from mapfilter.config.load import load_config
 
-PIPELINES = Path(__file__).resolve().parents[2] / "pipelines"
 SMALL = ["--set", "area.bbox=24.938,60.164,24.950,60.170"]
-
-
-def run_script(name: str, capsys: pytest.CaptureFixture[str], *given: str) -> dict:
-    argv, sys.argv = sys.argv, [name, "--json", *given]
-    try:
-        with pytest.raises(SystemExit) as ended:
-            runpy.run_path(str(PIPELINES / f"{name}.py"), run_name="__main__")
-    finally:
-        sys.argv = argv
-    out = capsys.readouterr()
-    assert ended.value.code == 0, out.err
-    return json.loads(out.out.splitlines()[-1])
 
 
 @pytest.mark.long

@@ -31,12 +31,5 @@ def sky_log(seed=0, spoofer=None, legs=None, radio=True, **model):
     return make_log(CRS, pseudoranges=ranges, start_utc_s=START_UTC_S, **tables)
 
 
-def off_m(log, estimate):
-    """How far off each epoch of an estimate is."""
-    east = np.interp(estimate.time_s, log.truth["time_s"], log.truth["east_m"])
-    north = np.interp(estimate.time_s, log.truth["time_s"], log.truth["north_m"])
-    return np.hypot(estimate.east_m - east, estimate.north_m - north)
-
-
 def no_rows(log, table):
     return pd.DataFrame(getattr(log, table)).iloc[:0]

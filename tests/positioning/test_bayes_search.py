@@ -6,6 +6,7 @@ from math import nan
 import numpy as np
 import pytest
 from cross_world import make_database, walk_log
+from true_places import error_m
 
 from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Status
@@ -24,13 +25,6 @@ def area(tmp_path_factory):
     return open_area(make_database(tmp_path_factory.mktemp("search")))
 
 
-def off_m(log, fix):
-    truth = log.truth
-    east_m = np.interp(fix.time_s, truth["time_s"], truth["east_m"])
-    north_m = np.interp(fix.time_s, truth["time_s"], truth["north_m"])
-    return float(np.hypot(fix.east_m - east_m, fix.north_m - north_m))
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_a_search_without_the_true_place_is_taken_over(area, seed):
     positioner = FEW.over_area(area)
@@ -46,7 +40,7 @@ def test_a_search_without_the_true_place_is_taken_over(area, seed):
             track = replace(track, belief=astray, status=Status.SEARCHING)
         track, news = positioner.step(track, epoch, rng)
         if news.fix.status is Status.CONVERGED:
-            switches.append(off_m(log, news.fix))
+            switches.append(error_m(log, news.fix))
         assert news.fix.status is not Status.LOST
     assert track.takeovers >= 1
     assert len(switches) == 1

@@ -11,8 +11,8 @@ from mapfilter.lattice import Lattice
 from mapfilter.models.fingerprint import BoundReading
 from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.positioning.bayes import tile_search
-from mapfilter.positioning.bayes.area_tiles import LevelRange
 from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.tile_parts import LevelRange
 from mapfilter.positioning.bayes.tile_search import SearchedTiles, places_of, searched_tiles
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.gnss.fixes import FixTerm

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from made_town import Town, walk_log
+from true_places import error_m
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.particle import UpdateInfo
@@ -70,12 +71,7 @@ def followed(positioner, log, seed):
     for epoch in epochs(log):
         state, output = positioner.step(state, epoch, rng)
         fix = output.fix
-        off_m.append(
-            np.hypot(
-                fix.east_m - np.interp(fix.time_s, truth["time_s"], truth["east_m"]),
-                fix.north_m - np.interp(fix.time_s, truth["time_s"], truth["north_m"]),
-            )
-        )
+        off_m.append(error_m(log, fix))
         claimed.append(fix.status in (Status.CONVERGED, Status.TRACKING))
         reasons.append({one.reason for one in output.unused if one.kind == "motion"})
         states.append(state)

@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from cross_world import CRS, EAST, LATTICE, NORTH, SOUTH, make_database, walk_log
-from sky_world import HEIGHTS, START_UTC_S, no_rows, off_m, sky_log, sky_table
+from sky_world import HEIGHTS, START_UTC_S, no_rows, sky_log, sky_table
+from true_places import error_m
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.alternative import NullHypothesis
@@ -51,14 +52,14 @@ def test_satellites_shorten_the_search(positioner):
     with_them, without = found(positioner, log), found(positioner, replace(
         log, pseudoranges=no_rows(log, "pseudoranges")))  # fmt: skip
     assert switch_m(with_them) < 0.7 * switch_m(without)
-    assert off_m(log, with_them)[with_them.converged_at :].mean() < 6
+    assert error_m(log, with_them)[with_them.converged_at :].mean() < 6
 
 
 def test_satellites_and_streets_find_a_walk_without_radio(positioner):
     log = sky_log(radio=False, most=4)
     estimate = found(positioner, log)
     assert estimate.converged_at is not None
-    assert off_m(log, estimate)[estimate.converged_at :].mean() < 6
+    assert error_m(log, estimate)[estimate.converged_at :].mean() < 6
 
 
 def test_a_phone_that_was_turned_may_receive_satellites(area):
@@ -154,7 +155,7 @@ def test_a_spoofer_is_rejected_and_honest_satellites_come_back(positioner, most)
     spoofer = Spoofer(200.0, 60.0, 300.0, 400.0, 50.0)
     honest, spoofed = sky_log(most=most), sky_log(spoofer=spoofer, most=most)
     estimates = [found(positioner, log) for log in (honest, spoofed)]
-    errors = [off_m(log, one) for log, one in zip((honest, spoofed), estimates, strict=True)]
+    errors = [error_m(log, one) for log, one in zip((honest, spoofed), estimates, strict=True)]
     about = (estimates[0].time_s >= 200.0) & (estimates[0].time_s < 320.0)
     assert np.median(errors[1][about]) < np.median(errors[0][about]) + 5.0
     assert errors[1][estimates[1].converged_at :].max() < 50.0
@@ -178,7 +179,7 @@ def test_a_spoofed_fix_is_rejected_too(positioner):
     fixes["east_m"] += lie
     told = replace(log, gnss=make_log(CRS, gnss=fixes).gnss)
     estimate = found(positioner, told)
-    assert off_m(told, estimate)[120:].max() < 30
+    assert error_m(told, estimate)[120:].max() < 30
     times = {u.time_s for u in estimate.unused if u.kind == "gnss"}
     assert 200 <= min(times) <= 204
     assert 255 <= max(times) < 268
@@ -196,7 +197,7 @@ def test_honest_satellites_find_a_filter_that_is_lost(positioner):
         told.append(news)
     estimate = estimate_of(positioner, told)
     assert track.takeovers >= 1
-    assert off_m(log, estimate)[-60:].mean() < 8
+    assert error_m(log, estimate)[-60:].mean() < 8
     assert south < estimate.north_m[-1] < north
 
 
@@ -208,7 +209,7 @@ def test_the_receiver_may_set_its_clock_anew(positioner, jump_m):
     estimate = found(positioner, replace(log, pseudoranges=ranges))
     late = [u for u in estimate.unused if u.kind == "pseudorange" and u.time_s > 150]
     assert len(late) < 30
-    assert off_m(log, estimate)[-100:].mean() < 6
+    assert error_m(log, estimate)[-100:].mean() < 6
 
 
 def test_one_satellite_with_an_echo_is_left_out_alone(positioner):
@@ -221,7 +222,7 @@ def test_one_satellite_with_an_echo_is_left_out_alone(positioner):
     told = [u for u in estimate.unused if 150 < u.time_s < 200]
     assert {u.what for u in told} == {name}
     assert {u.reason for u in told} == {Reason.REJECTED_BY_EVIDENCE}
-    assert off_m(log, estimate)[estimate.converged_at :].max() < 25
+    assert error_m(log, estimate)[estimate.converged_at :].max() < 25
 
 
 @pytest.mark.parametrize(
@@ -254,7 +255,7 @@ def test_a_start_eighteen_seconds_off_is_rejected_epoch_by_epoch(positioner):
     wrong["pseudorange_m"] += 18.0 * wrong["satellite"].map(rate)
     estimate = found(positioner, replace(log, pseudoranges=wrong))
     assert estimate.converged_at is not None
-    assert off_m(log, estimate)[estimate.converged_at :].mean() < 15
+    assert error_m(log, estimate)[estimate.converged_at :].mean() < 15
     after = estimate.time_s[estimate.converged_at]
     told = {u.time_s for u in estimate.unused if u.kind == "pseudorange" and u.time_s > after}
     assert len(told) > 0.2 * np.sum(estimate.time_s > after)
@@ -285,7 +286,7 @@ def test_hindsight_and_turns_alone_take_satellites_too(positioner):
     for one, smooth in ((log, True), (replace(log, motion=motion), False)):
         rng = np.random.default_rng(1)
         estimate = locate(one, replace(positioner, smooth=smooth), rng).estimate
-        assert off_m(log, estimate)[-30:].mean() < 12
+        assert error_m(log, estimate)[-30:].mean() < 12
 
 
 def test_the_exact_filter_takes_fixes_and_rejects_lies(area):
@@ -294,7 +295,7 @@ def test_the_exact_filter_takes_fixes_and_rejects_lies(area):
     fixes = log.truth[["time_s", "east_m", "north_m"]].assign(var_east_m2=9.0, var_north_m2=9.0)
     fixes.loc[fixes["time_s"] > 40, "north_m"] += 400.0
     estimate = found(grid, replace(log, gnss=make_log(CRS, gnss=fixes).gnss))
-    assert off_m(log, estimate)[10:].max() < 15
+    assert error_m(log, estimate)[10:].max() < 15
     assert {u.reason for u in estimate.unused if u.kind == "gnss"} >= {Reason.REJECTED_BY_EVIDENCE}
 
 

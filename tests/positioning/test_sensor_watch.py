@@ -7,6 +7,7 @@ import pytest
 from made_town import Town, walk_log
 from made_watch import CELLS, NO_STEP, STEP, STILL, report, told, walked
 from scipy.stats import multivariate_normal
+from true_places import error_m
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.positioning.bayes.options import BayesFilter
@@ -266,10 +267,7 @@ def tracked(log, seed, positioner):
     for epoch in epochs(log):
         state, output = positioner.step(state, epoch, rng)
         fix = output.fix
-        off_m = np.hypot(
-            fix.east_m - np.interp(fix.time_s, truth["time_s"], truth["east_m"]),
-            fix.north_m - np.interp(fix.time_s, truth["time_s"], truth["north_m"]),
-        )
+        off_m = error_m(log, fix)
         claimed = fix.status in (Status.CONVERGED, Status.TRACKING)
         rows.append((fix.time_s, off_m, fix.radii_m[-1], claimed))
         reasons.update(one.reason for one in output.unused if one.kind == "motion")

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from made_town import Town, slowed, walk_log
+from true_places import error_m
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.positioning.bayes.belief_changes import carried_on
@@ -133,10 +134,7 @@ def followed(log, seed, positioner=AREA):
     for epoch in epochs(log):
         state, output = positioner.step(state, epoch, rng)
         fix = output.fix
-        off_m = np.hypot(
-            fix.east_m - np.interp(fix.time_s, truth["time_s"], truth["east_m"]),
-            fix.north_m - np.interp(fix.time_s, truth["time_s"], truth["north_m"]),
-        )
+        off_m = error_m(log, fix)
         found.append((fix.time_s, fix.status, off_m, {one.reason for one in output.unused}, state))
     return found
 
@@ -354,15 +352,11 @@ def test_a_walk_in_feet_is_located_and_says_so():
     for seed in (1, 2, 3):
         log = in_feet(walk_log(TOWN, seed, error_db=3.0))
         rng = np.random.default_rng(seed)
-        truth = {name: log.truth[name].to_numpy() for name in ("time_s", "east_m", "north_m")}
         state, ends = AREA.begin(), []
         for epoch in epochs(log):
             state, output = AREA.step(state, epoch, rng)
             fix = output.fix
-            off_m = np.hypot(
-                fix.east_m - np.interp(fix.time_s, truth["time_s"], truth["east_m"]),
-                fix.north_m - np.interp(fix.time_s, truth["time_s"], truth["north_m"]),
-            )
+            off_m = error_m(log, fix)
             claimed = fix.status in (Status.CONVERGED, Status.TRACKING)
             ends.append((off_m < 50, claimed and not off_m < 50))
             reasons |= {one.reason for one in output.unused}

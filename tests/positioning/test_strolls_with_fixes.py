@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from made_town import Town, walk_log
+from true_places import error_m
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.options import BayesFilter
@@ -62,16 +63,13 @@ def strolled(seed, wild_db, *, fixes=True):
 
 def followed(seed, wild_db):
     log, slow_s = strolled(seed, wild_db)
-    rng, state, truth, rows = np.random.default_rng(seed), AREA.begin(), log.truth, []
+    rng, state, rows = np.random.default_rng(seed), AREA.begin(), []
     for epoch in epochs(log):
         state, output = AREA.step(state, epoch, rng)
         fix = output.fix
         if fix is None or fix.time_s <= slow_s:
             continue
-        off_m = np.hypot(
-            fix.east_m - np.interp(fix.time_s, truth["time_s"], truth["east_m"]),
-            fix.north_m - np.interp(fix.time_s, truth["time_s"], truth["north_m"]),
-        )
+        off_m = error_m(log, fix)
         stuck = any(one.reason is Reason.MOTION_STUCK for one in output.unused)
         rows.append((fix.status, off_m, stuck))
     return rows, state

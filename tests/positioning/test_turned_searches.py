@@ -6,6 +6,7 @@ from math import log, pi
 import numpy as np
 import pytest
 from made_town import Town, walk_log
+from true_places import error_m
 
 from mapfilter.filters.contract import Status
 from mapfilter.filters.hypotheses import Bins
@@ -47,17 +48,13 @@ def turned_log(seed, by_rad, turned_s=20.0):
 
 def searched(positioner, log, seed):
     """Search for a position; return errors, and whether they are claimed."""
-    truth = {name: log.truth[name].to_numpy() for name in ("time_s", "east_m", "north_m")}
     rng, state, rows = np.random.default_rng(seed), positioner.begin(), []
     for epoch in epochs(log):
         state, output = positioner.step(state, epoch, rng)
         if output is None or output.fix is None:
             continue
         fix = output.fix
-        off_m = np.hypot(
-            fix.east_m - np.interp(fix.time_s, truth["time_s"], truth["east_m"]),
-            fix.north_m - np.interp(fix.time_s, truth["time_s"], truth["north_m"]),
-        )
+        off_m = error_m(log, fix)
         rows.append((off_m, fix.status in (Status.CONVERGED, Status.TRACKING)))
     return np.array(rows).T
 

@@ -17,7 +17,7 @@ from mapfilter.filters.grid import GridBelief
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.integrity import RadialTail
 from mapfilter.positioning.merging import epochs
-from mapfilter.serving import state_file
+from mapfilter.serving import state_file, state_values
 from mapfilter.serving.state_file import decode, encode
 
 NOT_OF_PARTICLES = {GridBelief, RadialTail}
@@ -65,10 +65,10 @@ def classes_in(hint):
     return {hint} if isinstance(hint, type) and hint.__module__.startswith("mapfilter") else set()
 
 
-@pytest.mark.parametrize("name", state_file._CLASSES)
+@pytest.mark.parametrize("name", state_values._CLASSES)
 def test_whatever_a_saved_class_holds_can_be_saved(name):
-    saved = {*state_file._CLASSES.values(), *state_file._ENUMS.values()}
-    for hint in get_type_hints(state_file._CLASSES[name]).values():
+    saved = {*state_values._CLASSES.values(), *state_values._ENUMS.values()}
+    for hint in get_type_hints(state_values._CLASSES[name]).values():
         assert classes_in(hint) - saved <= NOT_OF_PARTICLES
 
 

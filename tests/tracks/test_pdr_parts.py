@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from mapfilter.tracks.pdr import vehicle
+from mapfilter.tracks.pdr import standing_bias
 from mapfilter.tracks.pdr.attitude import attitude
 from mapfilter.tracks.pdr.heading import compass_samples, yaw_offset
 from mapfilter.tracks.pdr.height import climbs, height_m
@@ -235,7 +235,7 @@ def test_odometry_of_months_takes_no_longer_than_its_rows():
 
 def test_longer_spans_of_a_long_recording_learn_the_same_bias(monkeypatch):
     rows, true_rad = drive(0.004)
-    monkeypatch.setattr(vehicle, "_MOST_SPANS", 60)
+    monkeypatch.setattr(standing_bias, "_MOST_SPANS", 60)
     motion, _, notes = reckon_odometry(rows)
     assert abs(motion["turn_rad"].sum() - true_rad) < 0.15 * 0.004 * np.ptp(rows["time_s"])
     assert "bias +0.2" in notes[0]

@@ -16,18 +16,6 @@ from mapfilter.tracks.readers.recorded_values import duplicates
 from mapfilter.tracks.readers.times import parse_times
 
 
-@pytest.fixture
-def written(tmp_path):
-    def write(name, data=None):
-        file, text = MADE[name]
-        path = tmp_path / file
-        content = text if data is None else data
-        path.write_bytes(content.encode() if isinstance(content, str) else content)
-        return path
-
-    return write
-
-
 def test_cells_of_lte_keep_their_carriers_codes_and_identities(written):
     rows = read_recording(written("gnettrack")).tables["radio"]
     serving, neighbour = (rows[rows["role"] == role] for role in ("serving", "neighbour"))

@@ -71,18 +71,6 @@ ROWS = {
 }
 
 
-@pytest.fixture
-def written(tmp_path):
-    def write(name, data=None):
-        file, text = MADE[name]
-        path = tmp_path / file
-        content = text if data is None else data
-        path.write_bytes(content.encode() if isinstance(content, str) else content)
-        return path
-
-    return write
-
-
 @pytest.mark.parametrize("name", MADE)
 def test_a_format_is_found_and_read_in_full(name, written):
     recording = read_recording(written(name))

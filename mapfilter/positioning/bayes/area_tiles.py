@@ -8,17 +8,15 @@ number of bytes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from threading import RLock
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from mapfilter._types import Bools, Bytes, Floats, Floats32, Ints, Ints32
+from mapfilter._types import Bytes, Floats32, Ints, Ints32
 from mapfilter.database.cell_levels import (
     CellLevels,
-    NearestPoints,
     PartExtents,
     PointReader,
     part_extents,
@@ -27,64 +25,15 @@ from mapfilter.database.cell_levels import (
 from mapfilter.database.parquet import read_columns
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.models.level_errors import roughness_px
-from mapfilter.models.tile_kernels import level_ranges, levels_at_points, tenths_of_roughness
+from mapfilter.models.tile_kernels import levels_at_points, tenths_of_roughness
 from mapfilter.models.way_map import map_log_likelihood
 from mapfilter.positioning.bayes.area_frame import BELOW_FLOOR_DB
 from mapfilter.positioning.bayes.bounded_cache import BoundedCache
+from mapfilter.positioning.bayes.tile_parts import LevelRange, Reaching, Tile, level_range
 
 TILE_PX = 128
 HELD_BYTES = 640 << 20
 """Most bytes of tiles and levels that are held at a time."""
-
-
-class LevelRange(NamedTuple):
-    """Least and largest level of a cell in some tiles, (rows, cols); NaN where it has none.
-
-    ``row`` and ``col`` are those of the first tile.
-    """
-
-    row: int
-    col: int
-    least_dbm: Floats32
-    most_dbm: Floats32
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Tile:
-    """A tile of an area.
-
-    Parameters
-    ----------
-    points : NearestPoints
-        Of a window that reaches beyond the tile by the width of the roughness.
-    row, col : ndarray of int64, shape (M,)
-        The points of the database that lie in the tile itself.
-    box : tuple of int
-        First and last row, first and last column of all nearest points.
-    """
-
-    points: NearestPoints
-    row: Ints
-    col: Ints
-    box: tuple[int, int, int, int]
-
-    @property
-    def corner(self) -> tuple[int, int]:
-        """Row and column of the first pixel of the arrays."""
-        return self.points.window[0], self.points.window[1]
-
-
-class _Reaching(NamedTuple):
-    """The cells that may have a level in a tile, ascending, (C,), and a bound of these levels.
-
-    The bound is by the footers of the parts until it is ``exact``. ``part`` (C) are the parts of
-    each cell, by their places among the extents.
-    """
-
-    band: Ints
-    bound_dbm: Floats
-    exact: Bools
-    part: tuple[Ints, ...]
 
 
 class AreaTiles:
@@ -156,7 +105,7 @@ class AreaTiles:
             box = int(row.min()), int(row.max()), int(col.min()), int(col.max())
             return Tile(points, row[own], col[own], box)
 
-        return self.held.get(("tile", number), make, _tile_bytes)
+        return self.held.get(("tile", number), make)
 
     def every_point(self) -> Ints:
         """Return the numbers of all points of the database, without what is known there."""
@@ -169,7 +118,7 @@ class AreaTiles:
         def make() -> Floats32:
             return map_log_likelihood(self.tile(number).points.edge_m, sd_m)
 
-        return self.held.get(("ways", number, sd_m), make, _array_bytes)
+        return self.held.get(("ways", number, sd_m), make)
 
     def levels(self, number: int, band: int) -> Floats32 | None:
         """Return a cell's levels at a tile's nearest points, (P,); None where it has none.
@@ -202,7 +151,7 @@ class AreaTiles:
                 received |= there
             return every_dbm if received else None
 
-        return self.held.get(("levels", number, band), make, _array_bytes)
+        return self.held.get(("levels", number, band), make)
 
     def _strongest(self, number: int, layer: int) -> Floats32:
         """Return the strongest and the second strongest level of a layer's cells, (2, P)."""
@@ -217,7 +166,7 @@ class AreaTiles:
                     top_dbm[0] = np.maximum(top_dbm[0], level_dbm)
             return top_dbm
 
-        return self.held.get(("strongest", number, layer), make, _array_bytes)
+        return self.held.get(("strongest", number, layer), make)
 
     def rough_db(self, number: int, band: int) -> Bytes | None:
         """Return the roughness of a cell's levels at a tile's pixels; None where it has none."""
@@ -230,7 +179,7 @@ class AreaTiles:
             tenths: Bytes = tenths_of_roughness(level_dbm, near, size)
             return tenths
 
-        return self.held.get(("rough", number, band), make, _array_bytes)
+        return self.held.get(("rough", number, band), make)
 
     def strong(self, number: int, bands: Ints32, limit_dbm: Floats32) -> Ints:
         """Return the places in ``bands`` of cells that may be above levels (K,) in a tile.
@@ -250,10 +199,10 @@ class AreaTiles:
         found: Ints = place[reaching.bound_dbm > limit]
         return found
 
-    def _reaching(self, number: int) -> _Reaching:
+    def _reaching(self, number: int) -> Reaching:
         """Return the cells with a part that may reach a tile's nearest points."""
 
-        def make() -> _Reaching:
+        def make() -> Reaching:
             top, bottom, left, right = self.tile(number).box
             low, high, west, east = self.extents.box.T
             meets = (low <= bottom) & (high >= top) & (west <= right) & (east >= left)
@@ -261,16 +210,16 @@ class AreaTiles:
             band, first = np.unique(self.extents.band[part], return_index=True)
             parts = tuple(np.split(part, first[1:])) if part.size else ()
             bound_dbm = np.array([self.extents.most_dbm[some].max() for some in parts])
-            return _Reaching(band, bound_dbm, np.zeros(band.size, dtype=np.bool_), parts)
+            return Reaching(band, bound_dbm, np.zeros(band.size, dtype=np.bool_), parts)
 
-        return self.held.get(("reaching", number), make, _reaching_bytes)
+        return self.held.get(("reaching", number), make)
 
     def range_of(self, band: int) -> LevelRange:
         """Return the range of a cell's levels by tiles; kept for good once it was read."""
         found = self._ranges.get(band)
         if found is None:
-            every = [self._levels_of_part(k) for k in self._parts_of(band)]
-            found = self._range(every)
+            parts = [self._levels_of_part(k) for k in self._parts_of(band)]
+            found = level_range(parts, self.database.lattice.cols, self.side, self.rows, self.cols)
             self._ranges[band] = found
         return found
 
@@ -284,44 +233,4 @@ class AreaTiles:
         def make() -> CellLevels:
             return read_levels(self.extents.part[part], self.database.lattice)
 
-        return self.held.get(("part", part), make, _cell_bytes)
-
-    def _range(self, parts: list[CellLevels]) -> LevelRange:
-        cols, tiles = self.database.lattice.cols, self.rows * self.cols
-        found = [level_ranges(*part, cols, self.side, self.cols, tiles) for part in parts]
-        least, most = (
-            reduce(some).reshape(self.rows, self.cols)
-            for reduce, some in zip(
-                (np.fmin.reduce, np.fmax.reduce), zip(*found, strict=True), strict=True
-            )
-        )
-        row, col = np.nonzero(np.isfinite(most))
-        part = np.s_[row.min() : row.max() + 1, col.min() : col.max() + 1]
-        return LevelRange(int(row.min()), int(col.min()), least[part].copy(), most[part].copy())
-
-
-def _tile_bytes(tile: Tile) -> int:
-    points = tile.points
-    arrays = (
-        points.near,
-        points.point,
-        points.way_id,
-        points.best_dbm,
-        points.second_dbm,
-        points.edge_m,
-        tile.row,
-        tile.col,
-    )
-    return sum(one.nbytes for one in arrays)
-
-
-def _cell_bytes(cell: CellLevels) -> int:
-    return cell.point.nbytes + cell.level_dbm.nbytes
-
-
-def _reaching_bytes(reaching: _Reaching) -> int:
-    return sum(one.nbytes for one in (*reaching[:3], *reaching.part))
-
-
-def _array_bytes(array: Floats32 | Bytes | None) -> int:
-    return 0 if array is None else array.nbytes
+        return self.held.get(("part", part), make)

@@ -1,4 +1,4 @@
-"""Dead reckoning of vehicles: speed and yaw rate, the gyroscope's bias learnt while standing."""
+"""Dead reckoning of vehicles by their speed, and a yaw rate or a gyroscope."""
 
 from __future__ import annotations
 
@@ -8,40 +8,27 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from mapfilter._constants import MAD_TO_SD
-from mapfilter._types import Bools, Floats
+from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.equal_times import joined_times
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.moved import UNDIRECTED, long_gaps, motion_from_odometry, odometry_gaps
 from mapfilter.tracks.pdr.attitude import attitude
-from mapfilter.tracks.pdr.gyroscope import (
-    MOST_BIAS_RADPS,
-    WALK_RAD_PER_SQRT_S,
-    error_notes,
-    shown_bias,
-)
-from mapfilter.tracks.pdr.heading import Compass, YawOffset, yaw_offset
+from mapfilter.tracks.pdr.gyroscope import error_notes
 from mapfilter.tracks.pdr.odometry_rows import gap_notes, speed_errors, usable_rows, usual_s
 from mapfilter.tracks.pdr.signals import Signals, inertial_signals
+from mapfilter.tracks.pdr.standing_bias import standing_bias
 from mapfilter.tracks.pdr.turns import ORIENTATION, Turning, turning_of_rate
 
 _STANDING_MPS, _GNSS_STANDING_MPS = 0.05, 0.3
-_SETTLING_S = 0.4
-_FEWEST_STANDING, _LEAST_STANDING_S = 5, 1.0
-"""Rows at standstill that show a bias, and how long they last together: the scatter of fewer says
-nothing of their error."""
-_APART_RADPS, _DEVIATIONS = 0.05, 4.0
-"""How far a rate at standstill may be from the usual one, also in deviations of its noise."""
-_LEAST_RATE_SD_RADPS = 5e-4
 _COURSE_MPS = 2.0
-_COURSE_BIAS_DEG = 2.0
-_MOST_SPANS = 50_000
+_NO_RATES = (
+    "odometry: no yaw rates (a column such as Yaw rate [deg/s] or yaw_rate_radps): "
+    f"{UNDIRECTED}; a phone's gyroscope and accelerometer show them, too"
+)
 _DENSE = 1.5
 """So many times as many yaw rates as speeds are integrated by themselves."""
-_UNSEEN_BIAS_DEG_PER_S = 0.05
-"""Error of the bias that standing does not show: of 0.02 deg/s a count, and of warming up."""
 
 
 def reckon_odometry(
@@ -78,18 +65,17 @@ def reckon_odometry(
         # Each rate is a mean over two intervals.
         motion, rate = _turned(motion, turning)
         averaged_s *= 2
-    stood = _settled(time_s, np.abs(speed) < _STANDING_MPS) & np.isfinite(rate)
-    standing = _enough(time_s, stood)
-    found, walk_rad = _bias(time_s, rate, standing, None, averaged_s)
-    if turning is not None and not standing.any():
-        walk_rad = max(walk_rad, turning.walk_rad_per_sqrt_s)
-    correction = np.interp(time_s, found.time_s, found.offset_rad)
+    bias = standing_bias(time_s, rate, np.abs(speed) < _STANDING_MPS, averaged_s)
+    if turning is not None and not bias.is_shown:
+        walk_rad = max(bias.walk_rad_per_sqrt_s, turning.walk_rad_per_sqrt_s)
+        bias = replace(bias, walk_rad_per_sqrt_s=walk_rad)
+    correction = bias.offset_at(time_s)
     # Over a rest without rows nothing was read of the gyroscope.
     rested = long_gaps(time_s) & (motion["turn_rad"].to_numpy() == 0)
     biased = np.where(rested, 0.0, np.diff(correction, prepend=correction[0]))
     turn = motion["turn_rad"].to_numpy() + biased
     has_rate = bool(np.isfinite(rate).any())
-    notes = unusable + _notes(found, stood, standing, has_rate=has_rate)
+    notes = (*unusable, *(bias.notes if has_rate else (_NO_RATES,)))
     # Which way it went meanwhile is as little known as over a gap.
     blind = has_rate & np.isnan(turn) & (np.abs(motion["step_m"].to_numpy()) > 0)
     if blind.any():
@@ -97,14 +83,13 @@ def reckon_odometry(
         notes += (f"odometry: no yaw rate over {blind_s:.1f} s of driving: motion is not known",)
         motion = motion.assign(step_m=motion["step_m"].where(~blind))
     by_gyroscope = turning is None or turning.source != ORIENTATION
-    notes += error_notes(walk_rad, of="yaw rate") if by_gyroscope else ()
-    imu = _noise(found, walk_rad, speed_errors(rows))
+    notes += error_notes(bias.walk_rad_per_sqrt_s, of="yaw rate") if by_gyroscope else ()
     notes += gap_notes(time_s, speed, turn)
     if rested.any():
         longest_s = float(np.diff(time_s, prepend=time_s[0])[rested].max())
         words = number_of(int(rested.sum()), "pause")
         notes += (f"odometry: {words} (longest {longest_s:.1f} s) between rests, taken as rests",)
-    return motion.assign(turn_rad=turn), imu, notes
+    return motion.assign(turn_rad=turn), bias.noise(speed_errors(rows)), notes
 
 
 def reckon_velocity(
@@ -154,13 +139,12 @@ def _driven(signals: Signals, rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNois
     course = rows["heading_rad"].to_numpy(dtype=np.float64)
     yaw = np.interp(time_s, signals.time_s, attitude(signals).yaw_rad)
     rate = np.gradient(yaw, time_s)
-    stood = _settled(time_s, speed < _GNSS_STANDING_MPS)
-    standing = _enough(time_s, stood)
     driving = (speed > _COURSE_MPS) & np.isfinite(course)
-    # Each rate is a mean over two intervals.
     course_offset = np.where(driving, course - yaw, np.nan)
-    found, walk_rad = _bias(time_s, rate, standing, course_offset, 2 * usual_s(time_s))
-    heading = yaw + np.interp(time_s, found.time_s, found.offset_rad)
+    # Each rate is a mean over two intervals.
+    slow, averaged_s = speed < _GNSS_STANDING_MPS, 2 * usual_s(time_s)
+    bias = standing_bias(time_s, rate, slow, averaged_s, course_offset)
+    heading = yaw + bias.offset_at(time_s)
     lasted_s = np.diff(time_s)
     step = np.concatenate([[0.0], lasted_s * (speed[1:] + speed[:-1]) / 2])
     # Over a rest a speed is noise, which would be that of the whole pause.
@@ -175,8 +159,8 @@ def _driven(signals: Signals, rows: pd.DataFrame) -> tuple[pd.DataFrame, ImuNois
             "turn_rad": wrap_rad(np.diff(heading, prepend=heading[0])),
         }
     )
-    notes = (*_notes(found, stood, standing, has_rate=True), *error_notes(walk_rad))
-    return motion, _noise(found, walk_rad, speed_errors(rows[["time_s"]])), notes
+    notes = (*bias.notes, *error_notes(bias.walk_rad_per_sqrt_s))
+    return motion, bias.noise(speed_errors(rows[["time_s"]])), notes
 
 
 def _unknown_steps(parts: Sequence[pd.DataFrame]) -> tuple[str, ...]:
@@ -212,94 +196,3 @@ def _turned(motion: pd.DataFrame, turning: Turning) -> tuple[pd.DataFrame, Float
     rate = np.full(len(time_s), np.nan)
     rate[1:-1] = (turn[2:] + turn[1:-1]) / apart_s
     return motion.assign(turn_rad=turn), rate
-
-
-def _settled(time_s: Floats, standing: Bools) -> Bools:
-    """Return where a vehicle has stood for 0.4 s and still stands: its body has come to rest."""
-    moving_s = np.where(standing, -np.inf, time_s)
-    settled: Bools = standing & (time_s - np.maximum.accumulate(moving_s) > _SETTLING_S)
-    settled[:-1] &= standing[1:]
-    return settled
-
-
-def _enough(time_s: Floats, stood: Bools) -> Bools:
-    """Return the rows at standstill, none where they are too few to show how they scatter."""
-    few = stood.sum() < _FEWEST_STANDING or stood.sum() * usual_s(time_s) < _LEAST_STANDING_S
-    return np.zeros_like(stood) if few else stood
-
-
-def _bias(
-    time_s: Floats, rate: Floats, standing: Bools, course_offset: Floats | None, averaged_s: float
-) -> tuple[YawOffset, float]:
-    """Smooth the gyroscope's bias, and the offset between its yaw and the course.
-
-    Returns also the random walk of the yaw (rad/√s), by the noise of rates at standstill, which are
-    means over ``averaged_s``.
-    """
-    # Seconds with rows only, and longer spans of a long recording, bound the smoother's steps.
-    elapsed_s = time_s - time_s[0]
-    span_s = max(1.0, float(np.ceil(len(np.unique(np.floor(elapsed_s))) / _MOST_SPANS)))
-    number, span = np.unique(np.floor(elapsed_s / span_s), return_inverse=True)
-    rates, sds, north = (np.full(len(number), np.nan) for _ in range(3))
-    usable, spread = standing & np.isfinite(rate), 0.0
-    if usable.any():
-        usual = float(np.median(rate[usable]))
-        spread = MAD_TO_SD * float(np.median(np.abs(rate[usable] - usual)))
-        near = np.abs(rate - usual) < max(_APART_RADPS, _DEVIATIONS * spread)
-        usable &= near & (abs(usual) < MOST_BIAS_RADPS)
-    bias = 0.0
-    if usable.any():
-        bias = float(shown_bias(rate[usable, None], spread)[0])
-        still = pd.Series(rate[usable]).groupby(span[usable]).agg(["median", "size"])
-        rates[still.index] = still["median"]
-        sds[still.index] = np.maximum(spread / np.sqrt(still["size"]), _LEAST_RATE_SD_RADPS)
-    walk_rad = float(np.hypot(WALK_RAD_PER_SQRT_S, spread * averaged_s**0.5))
-    if course_offset is not None:
-        known = np.isfinite(course_offset)
-        north[span[known]] = np.pi / 2 - course_offset[known]
-    missing = np.isnan(north)
-    none = np.full(len(number), np.nan)
-    centre_s = time_s[0] + (number + 0.5) * span_s
-    compass = Compass(centre_s, np.nan_to_num(north), none, none, missing)
-    found = yaw_offset(
-        compass,
-        rates,
-        sds,
-        use_compass=not missing.all(),
-        walk_rad_per_sqrt_s=walk_rad,
-        usual_radps=bias,
-    )
-    return found, walk_rad
-
-
-def _notes(found: YawOffset, stood: Bools, standing: Bools, *, has_rate: bool) -> tuple[str, ...]:
-    """Return what was learnt of the gyroscope's bias."""
-    if not has_rate:
-        return (
-            "odometry: no yaw rates (a column such as Yaw rate [deg/s] or yaw_rate_radps): "
-            f"{UNDIRECTED}; a phone's gyroscope and accelerometer show them, too",
-        )
-    bias = f"{np.degrees(found.rate_radps):+.3f} ± {np.degrees(found.rate_sd_radps):.3f} deg/s"
-    if not stood.any():
-        return ("yaw rate: the vehicle never stands, so that the bias could not be learnt",)
-    some = number_of(int(stood.sum()), "row")
-    if not standing.any():
-        needed = f"{_FEWEST_STANDING} rows and {_LEAST_STANDING_S:g} s"
-        return (f"yaw rate: {some} at standstill, too few to learn the bias (of {needed})",)
-    return (f"yaw rate: bias {bias}, of {some} at standstill",)
-
-
-def _noise(found: YawOffset, walk_rad: float, of_steps: ImuNoise) -> ImuNoise:
-    walk = float(np.degrees(walk_rad))
-    bias = float(np.hypot(np.degrees(found.rate_sd_radps), _UNSEEN_BIAS_DEG_PER_S))
-    with_course = bool(found.sd_rad[0] < np.pi)
-    lasting = float(np.degrees(np.sqrt(np.mean(found.sd_rad**2)))) if with_course else 0.0
-    return replace(
-        of_steps,
-        sigma_orient_deg=1.0,
-        bias_sd_deg=min(lasting + _COURSE_BIAS_DEG, 180.0) if with_course else 0.0,
-        drift_deg_per_sqrt_s=walk if with_course else 0.0,
-        turns="headings" if with_course else "gyro",
-        gyro_noise_deg_per_sqrt_s=0.0 if with_course else walk,
-        gyro_bias_deg_per_s=0.0 if with_course else bias,
-    )

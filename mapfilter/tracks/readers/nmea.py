@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from string import hexdigits
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from mapfilter._constants import DAY_S, KNOT_MPS
-from mapfilter._types import Bools, Floats, Ints
+from mapfilter._types import Floats, Ints
 from mapfilter.tracks.position_units import RADIUS_68, UERE_M
 from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.lines import blocks
+from mapfilter.tracks.readers.nmea_sentences import sentences
 from mapfilter.tracks.readers.nmea_stamps import stamped_dates
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.recording import Clock
@@ -34,13 +32,6 @@ _KINDS = {
     b"ZDA": ("time", "day", "month", "year"),
 }
 _FIELDS = 20
-_LINE_FEED = 10
-_DIGITS = np.array([int(c, 16) if (c := chr(i)) in hexdigits else -1 for i in range(256)])
-_MANY, _NEARLY_ALL = 10, 0.95
-
-
-_Sentences = tuple[list[bytes], list[Ints]]
-"""Parts of several sentences, separated by line feeds, and the lines of each."""
 
 
 def _matches(text: Text) -> bool:
@@ -51,8 +42,8 @@ def _matches(text: Text) -> bool:
 
 def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
     reading.program, reading.clock = "NMEA 0183 receiver", Clock("utc")
-    kinds = _sentences(text.data, reading)
-    tables = {kind: _table(kind, *kinds.pop(kind), reading) for kind in _KINDS}
+    found = sentences(text.data, _KINDS, reading)
+    tables = {kind: _table(kind, *found.pop(kind), reading) for kind in _KINDS}
     dates = _dates(tables)
     if dates.empty:
         gga = tables[b"GGA"]
@@ -76,83 +67,10 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: 
     reading.add("positions", columns, columns["line"])
 
 
-def _sentences(data: bytes, reading: Reading) -> dict[bytes, _Sentences]:
-    """Return the sentences of each kind that is read, with right checksums, and their lines.
-
-    Some programs write wrong checksums throughout: a kind of which nearly none is right is taken.
-    """
-    found: dict[bytes, _Sentences] = {kind: ([], []) for kind in _KINDS}
-    wrong: dict[bytes, _Sentences] = {kind: ([], []) for kind in _KINDS}
-    for block, first_line in blocks(memoryview(data), 1):
-        code = np.frombuffer(block + b"\n   ", dtype=np.uint8)
-        ends = np.flatnonzero(code == _LINE_FEED)
-        starts = np.concatenate([[0], ends[:-1] + 1])
-        number = first_line + np.arange(len(starts))
-        dollar = _first(code == ord("$"), starts, ends)
-        other = _first(code == ord("!"), starts, ends) >= 0
-        blank = np.add.reduceat(code > ord(" "), np.minimum(starts, ends)) == 0
-        blank |= starts == ends
-        reading.rows += int((~blank).sum())
-        reading.refuse(number[~blank & (dollar < 0) & ~other], "no NMEA sentence")
-        # Of the talker and the kind, GNRMC, the last three letters.
-        at = np.minimum(dollar[:, None] + [3, 4, 5], len(code) - 1)
-        letters = np.where(dollar[:, None] >= 0, code[at], 0).astype(np.uint8)
-        star = _last(code == ord("*"), starts, ends)
-        star = np.where(star > dollar, star, -1)
-        good = (star < 0) | (_given(code, star) == _total(code, dollar, star))
-        stops = np.where(star < 0, ends, star)
-        for kind in _KINDS:
-            of = (letters == np.frombuffer(kind, dtype=np.uint8)).all(axis=1)
-            for mask, (lines, numbers) in ((of & good, found[kind]), (of & ~good, wrong[kind])):
-                if mask.any():
-                    spans = zip((dollar[mask] + 1).tolist(), stops[mask].tolist(), strict=True)
-                    lines.append(b"\n".join(block[first:last].strip() for first, last in spans))
-                    numbers.append(number[mask])
-    for kind, (lines, numbers) in wrong.items():
-        count = sum(map(len, numbers))
-        if count >= _MANY and count > _NEARLY_ALL * (count + sum(map(len, found[kind][1]))):
-            reading.note(f"{kind.decode()}: nearly all {count} checksums are wrong; taken")
-            found[kind] = (lines, numbers)
-        else:
-            reading.refuse(_joined(numbers), "checksum is wrong")
-    return found
-
-
-def _first(mask: Bools, starts: Ints, ends: Ints) -> Ints:
-    """Return the first place of each line where a mask holds, -1 where there is none."""
-    places = np.append(np.flatnonzero(mask), len(mask))
-    found = places[np.searchsorted(places, starts)]
-    return np.where(found < ends, found, -1)
-
-
-def _last(mask: Bools, starts: Ints, ends: Ints) -> Ints:
-    """Return the last place of each line where a mask holds, -1 where there is none."""
-    places = np.concatenate([[-1], np.flatnonzero(mask)])
-    found = places[np.searchsorted(places, ends) - 1]
-    return np.where(found >= starts, found, -1)
-
-
-def _given(code: NDArray[np.uint8], star: Ints) -> Ints:
-    """Return the checksum of one or two hexadecimal digits after a star, -1 without one."""
-    high, low = (_DIGITS[code[np.minimum(star + i, len(code) - 1)]] for i in (1, 2))
-    return np.where(high < 0, -1, np.where(low < 0, high, 16 * high + low))
-
-
-def _total(code: NDArray[np.uint8], dollar: Ints, star: Ints) -> Ints:
-    """Return the exclusive or of all bytes between two places."""
-    total = np.bitwise_xor.accumulate(code)
-    return np.asarray(total[np.maximum(star, 1) - 1] ^ total[np.maximum(dollar, 0)], dtype=np.int64)
-
-
-def _joined(numbers: list[Ints]) -> Ints:
-    return np.concatenate(numbers) if numbers else np.zeros(0, dtype=np.int64)
-
-
-def _table(kind: bytes, lines: list[bytes], numbers: list[Ints], reading: Reading) -> Columns:
+def _table(kind: bytes, lines: list[bytes], places: Ints, reading: Reading) -> Columns:
     names = ["talker", *_KINDS[kind]]
     names += [f"field{i}" for i in range(len(names), _FIELDS)]
     rows = reading.rows
-    places = _joined(numbers)
     least = len(_KINDS[kind]) + 1 - (len(_MODE) if kind == b"RMC" else 0)
     table = line_columns(lines, places, reading, names, ",", ragged=least)
     reading.rows = rows
