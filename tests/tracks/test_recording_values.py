@@ -162,6 +162,18 @@ def test_a_damaged_nanosecond_loses_only_its_row(written):
     assert recording.unusable[0].lines == (at + 1,)
 
 
+@pytest.mark.parametrize(("state", "is_decoded"), [(8, True), (16384, True), (39, False)])
+def test_a_satellite_whose_time_is_not_decoded_has_no_pseudorange(written, state, is_decoded):
+    """Bit 3 is of a decoded time of the week, bit 14 of one that is known otherwise."""
+    lines = MADE["gnsslogger"][1].splitlines()
+    at = next(i for i, line in enumerate(lines) if line.startswith("Raw,"))
+    lines[at] = lines[at].replace(",16431,", f",{state},")
+    recording = read_recording(written("gnsslogger", "\n".join(lines)))
+    assert len(recording.tables["satellites"]) == 2 * COUNT - (not is_decoded)
+    refused = [] if is_decoded else [("Raw: the satellite's time is not decoded", (at + 1,))]
+    assert [(one.reason, one.lines) for one in recording.unusable] == refused
+
+
 def test_bars_are_levels_of_their_technology(tmp_path):
     path = tmp_path / "bars.csv"
     path.write_text(
