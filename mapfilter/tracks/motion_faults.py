@@ -185,7 +185,6 @@ def _directions(motion: pd.DataFrame) -> tuple[Floats, Bools]:
     if unknown.mean() > _MOSTLY_UNKNOWN:
         unknown, turned_rad = np.isnan(turn_rad), np.nan_to_num(turn_rad)
         heading_rad = np.cumsum(turned_rad) - turned_rad / 2
-    unknown[:1] = False
     return np.nan_to_num(heading_rad), unknown
 
 

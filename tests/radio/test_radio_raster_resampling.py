@@ -175,6 +175,17 @@ def test_pixels_a_hair_before_a_multiple_are_in_step_with_it():
     assert len(notes) == 1
 
 
+@pytest.mark.parametrize("hair", [{"west_m": 384999.999}, {"north_m": 6672999.999}])
+def test_pixels_a_hair_before_a_multiple_are_counted_with_those_on_it(hair):
+    off = replace(LATTICE, west_m=385002.0, north_m=6673002.0)
+    lattices = {"off": off, "hair": replace(LATTICE, **hair), "on": LATTICE}
+    files = [made(lattice, path=Path(f"{name}.tif")) for name, lattice in lattices.items()]
+    lattice, notes = common_lattice(files, None, "nearest")
+    assert (lattice.west_m, lattice.north_m) == pytest.approx((385000, 6673005), abs=0.002)
+    assert notes[1].startswith("1 of 3 rasters lie between the pixels")
+    assert notes[1].endswith(": off.tif")
+
+
 def set_of(*lattices):
     """Return a set with one file, of one cell, on each lattice."""
     files = tuple(

@@ -65,6 +65,21 @@ def test_a_number_that_hardly_a_level_reaches_means_no_data_far_from_all_others(
         assert nodata_taken_as_level(values) is None
 
 
+def test_a_hole_of_a_small_number_among_fewer_losses_makes_them_no_levels():
+    values = np.append(np.linspace(70, 150, 30), np.full(40, 0.5)).astype(np.float32)
+    assert nodata_taken_as_level(values) == (0.5, pytest.approx(4 / 7))
+
+
+@pytest.mark.parametrize("times", [30, 31])
+def test_more_than_ten_times_as_many_as_are_near_mean_no_data(times):
+    """Three are near: within 1 dB of zero, and within 20 dB of any other number."""
+    levels = np.linspace(-130, -45, 400, dtype=np.float32)
+    for number, near in ((0, -0.5), (-1, -15)):
+        values = np.concatenate([levels, np.full(3, near), np.full(times, number)])
+        found = nodata_taken_as_level(values.astype(np.float32))
+        assert found == (None if times == 30 else (number, pytest.approx(31 / 434)))
+
+
 @pytest.mark.parametrize("marker", [0, -1, 1])
 @pytest.mark.parametrize("place", [(0, 0), (0, 4), (2, 2), (4, 1)])
 def test_a_single_marker_means_no_data_far_from_all_pixels_beside_it(marker, place):

@@ -6,7 +6,7 @@ import pytest
 
 import mapfilter as mf
 from mapfilter.errors import InputError
-from mapfilter.tracks.speed_shift import shift_note
+from mapfilter.tracks.speed_shift import best_shift, shift_note
 
 COUNT = 900
 TIME_S = 1_778_666_400.0 + np.arange(float(COUNT))
@@ -63,6 +63,15 @@ def test_so_is_one_where_positions_end_early(notes, shift_s, seed):
     (note,) = notes(shift_s, seed=seed, fixes_s=220)
     assert float(note.partition(" best ")[2].split()[0]) == pytest.approx(-shift_s, abs=1.0)
     assert notes(0.0, seed=seed, fixes_s=220) == []
+
+
+def test_the_best_shift_leaves_three_minutes_in_common():
+    time_s = np.arange(600.0)
+    speeds = time_s, 10 + 5 * np.sin(time_s / 20) + 3 * np.sin(time_s / 7)
+    # A shift of 500 s leaves 100 s in common, and at one of 40 s speeds do not agree.
+    assert best_shift(np.array([-500.0, 0.0, 40.0]), speeds, speeds) == 0.0
+    assert best_shift(np.array([-500.0, 40.0]), speeds, speeds) is None
+    assert best_shift(np.array([0.0]), speeds, None) is None
 
 
 def test_recordings_of_three_minutes_have_one_shift_alone():

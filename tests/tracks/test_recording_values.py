@@ -108,6 +108,24 @@ def test_readings_that_a_program_repeats_are_left_out(written):
     assert "not renewed" in recording.unusable[0].reason
 
 
+def test_of_several_network_codes_of_a_cell_the_commonest_is_taken(written):
+    """Of 24 405 in rows 1 to 4, none in row 5, and 24 491 after; a cell of its own has one code."""
+    head, *rows = gnettrack().splitlines()
+    for i in (1, 2, 3, 4, 20):
+        rows[i] = rows[i].replace("\t24491\t", "\t24405\t")
+    rows[5] = rows[5].replace("\t24491\t", "\t\t")
+    rows[20] = rows[20].replace("102764173", "102764999")
+    recording = read_recording(written("gnettrack", "\n".join([head, *rows])))
+    radio = recording.tables["radio"]
+    serving = radio[radio["role"] == "serving"]
+    assert len(serving) == COUNT
+    known = serving.groupby("ci")[["mcc", "mnc"]].agg(set)
+    assert known.loc[102_764_173].tolist() == [{244}, {91}]
+    assert known.loc[102_764_999].tolist() == [{244}, {5}]
+    notes = [note for note in recording.notes if "network codes" in note]
+    assert notes == ["radio: cell 102764173 with 2 network codes, 244-91 taken"]
+
+
 def test_ephemerides_of_all_constellations_are_on_one_time(written):
     rows = read_recording(written("rinex-nav/3")).tables["ephemerides"]
     assert rows["satellite"].tolist() == ["G07", "E12", "C20"]
@@ -148,6 +166,18 @@ def test_a_damaged_nanosecond_loses_only_its_row(written):
     assert len(recording.tables["satellites"]) == 2 * COUNT - 1
     assert recording.unusable[0].reason == "Raw: a time is missing"
     assert recording.unusable[0].lines == (at + 1,)
+
+
+@pytest.mark.parametrize(("state", "is_decoded"), [(8, True), (16384, True), (39, False)])
+def test_a_satellite_whose_time_is_not_decoded_has_no_pseudorange(written, state, is_decoded):
+    """Bit 3 is of a decoded time of the week, bit 14 of one that is known otherwise."""
+    lines = MADE["gnsslogger"][1].splitlines()
+    at = next(i for i, line in enumerate(lines) if line.startswith("Raw,"))
+    lines[at] = lines[at].replace(",16431,", f",{state},")
+    recording = read_recording(written("gnsslogger", "\n".join(lines)))
+    assert len(recording.tables["satellites"]) == 2 * COUNT - (not is_decoded)
+    refused = [] if is_decoded else [("Raw: the satellite's time is not decoded", (at + 1,))]
+    assert [(one.reason, one.lines) for one in recording.unusable] == refused
 
 
 def test_bars_are_levels_of_their_technology(tmp_path):

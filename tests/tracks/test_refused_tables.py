@@ -32,6 +32,13 @@ def test_an_unknown_table_names_its_columns_and_options_for_them(tmp_path):
     assert fault.hint.endswith("such as time=COLUMN")
 
 
+def test_named_columns_without_one_of_times_are_refused_with_the_option_for_it(tmp_path):
+    fault = refused(tmp_path, "a,b,c\n60.1,24.9,7\n", lat_deg="a", lon_deg="b")
+    assert (fault.expected, fault.got) == ("a column of times", "a, b, c")
+    assert fault.hint == "--column time=COLUMN"
+    assert fault.where.endswith("table.csv header")
+
+
 @pytest.mark.parametrize("name", ["track.json", "track.xlsx"])
 def test_other_files_are_named_by_their_suffix(tmp_path, name):
     fault = refused(tmp_path, '{"type": 1, "time": 2}\n', name)
