@@ -43,7 +43,7 @@ from mapfilter.tracks.kinds import leave_out
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.range_units import with_range_notes
-from mapfilter.workflows.apart import check_out_apart
+from mapfilter.workflows.apart import check_inputs_kept, check_out_apart, named_inputs
 from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.kernels import compiled_beside
 from mapfilter.workflows.planned_cells import cells_beside_log, plan_antennas
@@ -64,6 +64,7 @@ from mapfilter.workflows.results import (
     SUMMARY,
     check_figures_of_replay,
     older_results,
+    replaced_by_replay,
 )
 from mapfilter.workflows.served import served_points, street_map
 from mapfilter.workflows.track_pictures import (
@@ -140,6 +141,7 @@ def run_replay(
     for folder in (out, *(out / path.name for path in several)):
         check_out_apart(folder, [*own, *journeys.paths, *config.track.recordings])
         check_figures_of_replay(folder)
+        check_inputs_kept([*journeys.paths, *named_inputs(config)], replaced_by_replay(folder))
     has_sites = database is not None or config.cells.plan is not None
     if not has_sites:
         journeys.check_siteless()
