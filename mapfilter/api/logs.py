@@ -133,7 +133,7 @@ def read_log_of_area(
         As of :func:`read_log`.
     """
     combine = CombineOptions(about_deg=about_deg, factors=factors)
-    return open_log(path, crs=crs, options=OpenOptions(combine=combine)).log
+    return open_log(Path(path), crs=crs, options=OpenOptions(combine=combine)).log
 
 
 def _origin(given: object, faults: Faults) -> tuple[float, float] | None:

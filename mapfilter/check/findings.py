@@ -71,7 +71,8 @@ REMEDIES = {
     "EIRP, too.",
     "levels-above-eirp": "Check the EIRP, or what the rasters hold.",
     "log-cells-unknown": "Take the plan of the network that was received, with mcc, mnc, lac and "
-    "ci, or name the cells in the log by the plan's ids.",
+    "ci, or name the cells in the log by the plan's ids. Cells of another network, as of a second "
+    "SIM, are not used.",
     "log-degrees-rounded": "Export positions with five decimals or more of a degree; with three "
     "they lie in steps of 100 m.",
     "log-headings": "Give headings in radians counter-clockwise from grid east: pi/2 minus a "

@@ -98,9 +98,10 @@ DIALECTS: Mapping[str, Dialect] = {
 def read_csv(path: Path, dialect: Dialect) -> Rows:
     """Read a file of measurements; bad rows are refused one by one."""
     rows = Rows(path)
-    if is_windows(path):
+    windows = is_windows(path)
+    if windows:
         rows.remarks.append("no UTF-8; read as Windows-1252")
-    lines = lines_of(path)
+    lines = lines_of(path, windows=windows)
     separator, header = _header(lines)
     if not header:
         raise fail(InputError, str(path), "a header line and rows", "nothing", "no text file")

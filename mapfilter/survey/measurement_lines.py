@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
@@ -16,14 +17,21 @@ from mapfilter.errors import InputError, fail
 SEPARATORS = (",", ";", "\t")
 LONGEST_LINE = _HEAD_BYTES = 1 << 16
 """Characters of a line, and bytes of a file's beginning."""
-_TAIL_BYTES = 1 << 18
+_TAIL_BYTES, _PART_BYTES = 1 << 18, 1 << 20
+_FOREIGN_WORD = re.compile(rb"[A-Za-z][\x80-\xff]|[\x80-\xff][A-Za-z]")
 Lines = Iterator[tuple[int, str | None]]
 """Line numbers and texts; None for a line too long to be one."""
 
 
-def lines_of(path: Path) -> Lines:
-    """Yield line numbers and texts; None for a line too long to be one."""
-    with _open_text(path) as stream:
+def lines_of(path: Path, *, windows: bool | None = None) -> Lines:
+    """Yield line numbers and texts; None for a line too long to be one.
+
+    Parameters
+    ----------
+    windows : bool or None
+        Whether the file is in Windows-1252, not UTF-8; None for what the names of columns say.
+    """
+    with _open_text(path, windows) as stream:
         line = 0
         while text := stream.readline(LONGEST_LINE):
             line += 1
@@ -59,7 +67,7 @@ def without_last(lines: Lines, last: list[int]) -> Lines:
     last += [before[0]] if before is not None else []
 
 
-def _open_text(path: Path) -> TextIO:
+def _open_text(path: Path, windows: bool | None) -> TextIO:
     """Open a file as text in which an invalid byte invalidates only its own row."""
     with open_input(path) as stream:
         head = stream.read(_HEAD_BYTES)
@@ -69,15 +77,28 @@ def _open_text(path: Path) -> TextIO:
         raise fail(InputError, str(path), "text in UTF-8", wide, "saved as Unicode by Excel")
     if head.startswith(b"\x1f\x8b"):
         raise fail(InputError, str(path), "text", "a gzip file", "unpack it first")
-    encoding = "cp1252" if _has_windows_names(head) else "utf-8-sig"
+    if windows is None:
+        windows = _is_windows(head.lstrip().split(b"\n", 1)[0])
+    encoding = "cp1252" if windows else "utf-8-sig"
     return io.TextIOWrapper(open_input(path), encoding=encoding, errors="replace")
 
 
 def is_windows(path: Path) -> bool:
-    """Return whether the names of columns are in Windows-1252; a wrong byte below is only that."""
+    """Return whether a file is in Windows-1252, by lines with words that are no ASCII.
+
+    A wrong byte in a number is only that.
+    """
+    foreign = b""
     with open_input(path) as stream:
-        return _has_windows_names(stream.read(_HEAD_BYTES))
+        while len(foreign) < _HEAD_BYTES and (part := stream.read(_PART_BYTES)):
+            part += stream.readline(LONGEST_LINE)
+            if not part.isascii():
+                lines = part.splitlines(keepends=True)
+                foreign += b"".join(line for line in lines if _FOREIGN_WORD.search(line))
+    return _is_windows(foreign)
 
 
-def _has_windows_names(head: bytes) -> bool:
-    return first_foreign_byte(head.lstrip().split(b"\n", 1)[0]) >= 0
+def _is_windows(text: bytes) -> bool:
+    """Return whether text is in Windows-1252, by its whole lines."""
+    end = text.rfind(b"\n") + 1
+    return first_foreign_byte(text[:end] or text) >= 0

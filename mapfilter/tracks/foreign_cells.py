@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection
 
-from pandas import DataFrame
+from pandas import DataFrame, isna
 
 from mapfilter._words import number_of
 from mapfilter.errors import listed
@@ -49,15 +49,56 @@ def foreign_cells(names: Collection[str], plan: CellPlan, of: str = "database") 
     # One among many fits by accident.
     if exchanged > len(identities) / 2:
         return f"{exchanged} of them would be with lac (tac) and ci exchanged: columns exchanged?"
-    own = {
+    own = _networks(table)
+    if not networks or not own or networks & own:
+        return ""
+    return f"they are of {_named(networks)}, the {of} holds {_named(own, '')}"
+
+
+def other_networks(radio: DataFrame, plan: CellPlan) -> str:
+    """Return how many reports are of networks that a plan does not hold; "" for none.
+
+    Parameters
+    ----------
+    radio : pandas.DataFrame
+        Rows of cells that the plan lacks: cell and, where the log has them, mcc and mnc.
+
+    Examples
+    --------
+    >>> from mapfilter.radio.cells import Cell
+    >>> identity = {"mcc": 244, "mnc": 91, "lac": 3021, "ci": 11701}
+    >>> cell = Cell("A", "S", 0.0, 0.0, 30.0, 0.0, 55.0, 1800.0, **identity)
+    >>> plan = CellPlan("EPSG:32635", (cell,))
+    >>> other_networks(DataFrame({"cell": ["244-91-1-2", "244-5-1-2", "244-5-1-3"]}), plan)
+    '2 of them are of network 244-05, the plan holds 244-91'
+    """
+    own = _networks(PlanNames(plan))
+    if not own:
+        return ""
+    named = (parse_cgi(str(name)) for name in radio["cell"])
+    networks = [None if found is None else found[:2] for found in named]
+    if {"mcc", "mnc"} <= set(radio):
+        stated = zip(radio["mcc"], radio["mnc"], strict=True)
+        networks = [
+            by_name if isna(mcc) or isna(mnc) else (int(mcc), int(mnc))
+            for by_name, (mcc, mnc) in zip(networks, stated, strict=True)
+        ]
+    others = Counter(network for network in networks if network is not None and network not in own)
+    if not others:
+        return ""
+    count = others.total()
+    some = f"{count} of them {'is' if count == 1 else 'are'}"
+    return f"{some} of {_named(others)}, the plan holds {_named(own, '')}"
+
+
+def _networks(table: PlanNames) -> set[tuple[int, int]]:
+    """Return mcc and mnc of the cells of a plan that have both."""
+    return {
         (cell.mcc, cell.mnc)
         for cells in table.by_ci.values()
         for cell in cells
         if cell.mcc is not None and cell.mnc is not None
     }
-    if not networks or not own or networks & own:
-        return ""
-    return f"they are of {_named(networks)}, the {of} holds {_named(own, '')}"
 
 
 def unknown_neighbours_note(radio: DataFrame, plan: CellPlan) -> tuple[str, ...]:

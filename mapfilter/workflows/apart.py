@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from mapfilter.config.fields import Section
@@ -33,6 +33,11 @@ def input_paths(config: Config) -> dict[str, tuple[Path, ...]]:
     return paths
 
 
+def named_inputs(config: Config) -> tuple[Path, ...]:
+    """Return the files and folders of :func:`input_paths`."""
+    return tuple(path for paths in input_paths(config).values() for path in paths)
+
+
 def check_no_input_replaced(config: Config, *outputs: Path) -> None:
     """Raise OutputError, with every fault, where an output would replace an input.
 
@@ -61,6 +66,22 @@ def check_out_apart(out: Path, inputs: Sequence[Path], option: str = "--out") ->
             hint = "results need a folder of their own"
             faults.add(option, f"a folder outside {path}, which is an input", str(out), hint)
     faults.raise_if_any(ConfigError)
+
+
+def check_inputs_kept(inputs: Iterable[Path], replaced: Iterable[Path]) -> None:
+    """Raise OutputError, with every fault, where results would replace an input.
+
+    Parameters
+    ----------
+    replaced : iterable of Path
+        All that is written, and what is left of older results.
+    """
+    faults, places = Faults(), {path.resolve() for path in replaced}
+    for path in dict.fromkeys(inputs):
+        if path.resolve() in places:
+            got = "an input that they would replace"
+            faults.add(str(path), "no file of the results", got, "give another folder by --out")
+    faults.raise_if_any(OutputError)
 
 
 def _is_in(place: Path, folder: Path) -> bool:

@@ -12,6 +12,7 @@ from mapfilter.geodesy import same_crs, short_crs
 from mapfilter.lattice import Lattice, outside_m
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.radio.cells import CellPlan
+from mapfilter.tracks.foreign_cells import other_networks
 from mapfilter.tracks.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.misplaced import AWAY_M
@@ -109,7 +110,8 @@ def _is_near(path: Path, log: TrackLog, lattice: Lattice, findings: Findings) ->
 
 def _check_cells(path: Path, log: TrackLog, plan: CellPlan, findings: Findings) -> None:
     """Report serving cells that the plan lacks, and logs without serving cells."""
-    serving = log.radio["cell"][(log.radio["role"] == SERVING).to_numpy()].dropna()
+    rows = log.radio[(log.radio["role"] == SERVING).to_numpy() & log.radio["cell"].notna()]
+    serving = rows["cell"]
     if serving.empty:
         evidence = f"No serving cell is named in {number_of(len(log.radio), 'row')} of reports."
         findings.add("log-cells-unknown", str(path), evidence, "warning")
@@ -119,6 +121,8 @@ def _check_cells(path: Path, log: TrackLog, plan: CellPlan, findings: Findings) 
         # The most frequent first.
         ids = serving[unknown].value_counts().index.astype(str).tolist()
         evidence = f"{int(unknown.sum())} of {number_of(len(serving), 'report')} are of "
-        evidence += f"{number_of(len(ids), 'serving cell')} that the plan lacks: {listed(ids)}."
+        evidence += f"{number_of(len(ids), 'serving cell')} that the plan lacks: {listed(ids)}"
+        others = other_networks(rows[unknown], plan)
+        evidence += f"; {others}." if others else "."
         severity: Severity = "error" if unknown.all() else "warning"
         findings.add("log-cells-unknown", str(path), evidence, severity)

@@ -34,7 +34,7 @@ from mapfilter.report.saving import save
 from mapfilter.tracks.misplaced import check_near
 from mapfilter.tracks.open_options import OpenOptions
 from mapfilter.tracks.placeless import is_local_frame
-from mapfilter.workflows.apart import check_out_apart
+from mapfilter.workflows.apart import check_inputs_kept, check_out_apart
 from mapfilter.workflows.fingerprints import WITHOUT_STEPS, read_database, read_reports
 from mapfilter.workflows.result_text import to_jsonable
 from mapfilter.workflows.results import (
@@ -127,6 +127,8 @@ def run_locate(
     began_s = time.perf_counter()
     check_out_apart(out, [database, log])
     check_figures_of_reports(out)
+    written = [out / name for name in (POSITIONS, FIGURES, PICTURE_OF_REPORTS)]
+    check_inputs_kept([database, log, *truth], written)
     combine = replace(WITHOUT_STEPS.combine, truth=tuple(truth))
     options = replace(WITHOUT_STEPS, zone=zone, columns=columns or {}, combine=combine)
     known, (reports, names) = _inputs(database, log, crs, level_error_db, options)

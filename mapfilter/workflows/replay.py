@@ -20,7 +20,7 @@ from mapfilter.errors import ConfigError, fail, noted
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.filter import FilterOptions
 from mapfilter.positioning.kalman.filter import KalmanFilter
-from mapfilter.workflows.apart import check_out_apart
+from mapfilter.workflows.apart import check_inputs_kept, check_out_apart, named_inputs
 from mapfilter.workflows.filter_choice import filter_choice
 from mapfilter.workflows.kernels import compiled_beside
 from mapfilter.workflows.replay_baseline import Baselines
@@ -29,7 +29,12 @@ from mapfilter.workflows.replay_log import LogReplay
 from mapfilter.workflows.replay_logs import ReplayLogs
 from mapfilter.workflows.replayed import ReplayResult, summary_figures, summary_of
 from mapfilter.workflows.result_text import to_jsonable
-from mapfilter.workflows.results import SUMMARY, check_figures_of_replay, older_results
+from mapfilter.workflows.results import (
+    SUMMARY,
+    check_figures_of_replay,
+    older_results,
+    replaced_by_replay,
+)
 from mapfilter.workflows.track_pictures import drawn_beside
 
 
@@ -82,6 +87,7 @@ def run_replay(
     for folder in (out, *(out / path.name for path in several)):
         check_out_apart(folder, [*own, *journeys.paths, *config.track.recordings])
         check_figures_of_replay(folder)
+        check_inputs_kept([*journeys.paths, *named_inputs(config)], replaced_by_replay(folder))
     if not filters.has_sites:
         journeys.check_siteless()
     journeys.check(None if database is None else database.lattice)

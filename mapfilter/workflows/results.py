@@ -80,6 +80,11 @@ def _check_figures(
         raise fail(OutputError, str(figures), f"figures of {whose}, or nothing yet", got, hint)
 
 
+def replaced_by_replay(out: Path) -> list[Path]:
+    """Return the files that a replay writes into a folder, and those of older ones in it."""
+    return [*(out / name for name in _OF_ONE_LOG), *(older_results(out) if out.is_dir() else ())]
+
+
 def older_reports(out: Path) -> list[Path]:
     """Return the files that an older ``locate`` wrote in a folder."""
     if not (out / FIGURES).is_file():

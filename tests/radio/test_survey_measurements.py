@@ -425,6 +425,19 @@ def test_a_survey_in_windows_1252_can_be_mapped(tmp_path):
     assert found.notes == ("messung.csv: no UTF-8; read as Windows-1252",)
 
 
+@pytest.mark.parametrize("rows_before", [0, 5000])
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1252"])
+def test_cells_of_a_survey_keep_their_letters_in_windows_1252(encoding, rows_before, tmp_path):
+    path = tmp_path / "messung.csv"
+    names = ["A"] * rows_before + ["Köln_1", "Île-2", "A"] * 20
+    rows = (f"60.1{n:04d},24.94,-80,{name},{1_700_000_000 + n}\n" for n, name in enumerate(names))
+    path.write_bytes(("lat,lon,level_dbm,cell,time\n" + "".join(rows)).encode(encoding))
+    found = read_measurements([path])
+    assert {*found.cell_ids} == {"A", "Köln_1", "Île-2"}
+    noted = "messung.csv: no UTF-8; read as Windows-1252"
+    assert (noted in found.notes) == (encoding == "cp1252")
+
+
 @pytest.mark.parametrize(("family", "levels"), [("LTE", range(20, 60)), ("NR", range(58, 98))])
 def test_a_few_values_above_the_largest_asu_lose_their_rows_only(family, levels, tmp_path):
     head = "mcc,mnc,lac,cellid,lat,lon,signal,measured_at,rating,act,ta"

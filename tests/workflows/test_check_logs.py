@@ -40,6 +40,22 @@ def test_cells_that_the_plan_lacks(check, log):
     assert "No serving cell is named" in check(log)["log-cells-unknown"]["evidence"]
 
 
+def test_cells_of_a_second_sim_are_those_of_another_network(check, world, log, tmp_path):
+    plan = pd.read_csv(world.plan)
+    plan = plan.assign(mcc=244, mnc=91, lac=3021, ci=range(1, len(plan) + 1))
+    plan.to_csv(tmp_path / "identified.csv", index=False)
+    rows = pd.read_csv(log / "radio.csv")
+    rows = rows[(rows["role"] == "serving") & rows["cell"].isin(plan["cell"])].iloc[:5]
+    other = rows.iloc[:4].assign(cell="", mcc=244, mnc=5, lac=7, ci=[11, 11, 12, 13])
+    pd.concat([rows, other]).to_csv(log / "radio.csv", index=False)
+    identified = settings(cells__plan=f'"{tmp_path / "identified.csv"}"')
+    evidence = check(log, *identified)["log-cells-unknown"]["evidence"]
+    assert evidence == (
+        "4 of 9 reports are of 3 serving cells that the plan lacks: 244-5-7-11, 244-5-7-12, "
+        "244-5-7-13; 4 of them are of network 244-05, the plan holds 244-91."
+    )
+
+
 def test_headings_by_a_compass_are_a_finding(check, log):
     change(log / "motion.csv", heading_rad=lambda heading: math.pi / 2 - heading)
     found = check(log)

@@ -98,6 +98,40 @@ def test_results_are_not_written_among_recordings(recordings):
     assert_done(mapfilter(*given, *undrawn, "--out", recordings / "located"))
 
 
+@pytest.mark.parametrize("option", ["--log", "--truth"])
+def test_results_that_are_read_are_not_replaced(recordings, tmp_path, option):
+    replay = ["replay", "--filter", "ekf", *settings(output__pictures="none")]
+    log, out = recordings / "positions.csv", tmp_path / "located"
+    assert_done(mapfilter(*replay, "--log", log, "--out", out))
+    before = contents(out)
+    given = ["--log", log] if option == "--truth" else []
+    refused = mapfilter(*replay, *given, option, out / "estimate.gpx", "--out", out)
+    told = "estimate.gpx: expected no file of the results, found an input that they would replace"
+    assert_refused(refused, told, "another folder by --out")
+    assert contents(out) == before
+
+
+def test_results_of_one_of_several_logs_are_not_replaced_where_they_are_read(recordings, tmp_path):
+    """Results of all logs are left out where those of one replace them."""
+    replay = ["replay", "--filter", "ekf", *settings(output__pictures="none")]
+    inner, out = tmp_path / "located" / "positions", tmp_path / "located"
+    assert_done(mapfilter(*replay, "--log", recordings / "positions.csv", "--out", inner))
+    before = contents(out)
+    refused = mapfilter(*replay, "--log", inner / "estimate.gpx", "--out", out)
+    assert_refused(refused, "estimate.gpx: expected no file of the results")
+    assert contents(out) == before
+
+
+def test_positions_of_single_reports_are_not_replaced_where_they_are_read(recordings, tmp_path):
+    out = tmp_path / "located"
+    given = ["locate", "--db", recordings, "--log", recordings, "--out", out]
+    assert_done(mapfilter(*given))
+    before = contents(out)
+    given[4] = out / "positions.csv"
+    assert_refused(mapfilter(*given), "positions.csv: expected no file of the results")
+    assert contents(out) == before
+
+
 @pytest.mark.parametrize("log", [".", "positions.csv"])
 def test_a_recording_called_positions_is_not_replaced_by_positions(recordings, log):
     before = contents(recordings)

@@ -14,9 +14,13 @@ _ROWS, _LEAST_S, _LEAST_TIMES = 3.0, 2.0, 3
 _SLOWEST_S, _FASTEST_S = 1.0, 0.2
 """Longest time of a step, and the shortest: others are no steps."""
 _MOSTLY, _REPEATED = 0.9, 0.5
-_FEWEST_CHANGES, _CHANGING = 5.0, 0.05
-"""Least number, and share of all times, of changes between times given once and those given twice:
-a part that was delivered twice begins and ends but once."""
+_FEWEST_CHANGES, _CHANGING, _CHANGING_ALIKE = 5.0, 0.05, 0.01
+"""Least number, and shares of all times, of changes between times given once and those given twice:
+a part that was delivered twice begins and ends but once. The latter share counts where rows of
+different times are equal, too, so that being equal tells nothing."""
+_ALIKE = 0.9
+_STEP_M, _STEPS_PER_S = (0.3, 1.1), (1.5, 2.5)
+"""Lengths of one step, and how many of them a walker makes."""
 
 
 def times_of_batches(time_s: Floats) -> Floats:
@@ -54,7 +58,9 @@ def times_of_batches(time_s: Floats) -> Floats:
     return spread
 
 
-def times_of_cut_seconds(time_s: Floats, equal: Bools) -> Floats:
+def times_of_cut_seconds(
+    time_s: Floats, equal: Bools, *, alike: bool = False, walked: bool = False
+) -> Floats:
     """Return times of rows cut to whole seconds, spread over these, where equal ones are several.
 
     Two steps of one second may be equal rows. Those that were delivered twice are so in all of a
@@ -67,6 +73,10 @@ def times_of_cut_seconds(time_s: Floats, equal: Bools) -> Floats:
         In rising order.
     equal : (N,) array of bool
         Which rows equal an earlier one.
+    alike : bool
+        Whether rows of different times are equal, too, but for these.
+    walked : bool
+        Whether these are surely the steps of a walker.
 
     Returns
     -------
@@ -85,9 +95,12 @@ def times_of_cut_seconds(time_s: Floats, equal: Bools) -> Floats:
     if not equal.any() or (time_s != np.round(time_s)).any():
         return time_s
     times, first, count = np.unique(time_s, return_index=True, return_counts=True)
-    doubled = 2 * np.add.reduceat(equal.astype(np.int64), first) >= count
+    repeats = np.add.reduceat(equal.astype(np.int64), first)
+    doubled = 2 * repeats == count if alike else 2 * repeats >= count
     changes = np.count_nonzero(np.diff(doubled))
-    if changes < max(_FEWEST_CHANGES, _CHANGING * times.size) or count.max() > STEPS_PER_S:
+    share = _CHANGING_ALIKE if alike else _CHANGING
+    apart = walked or changes >= max(_FEWEST_CHANGES, share * times.size)
+    if not apart or count.max() > STEPS_PER_S:
         return time_s
     spread: Floats = time_s + (np.arange(time_s.size) - np.repeat(first, count)) / np.repeat(
         count, count
@@ -134,12 +147,23 @@ def _apart_in_seconds(table: str, rows: pd.DataFrame) -> tuple[pd.DataFrame, str
         if not ((count == 1).all() or are_own_counts(time_s, count)):
             return rows, ""
     equal = duplicates(rows)
-    spread = times_of_cut_seconds(time_s, equal)
+    values = rows.drop(columns="time_s")
+    alike = bool(values.value_counts(dropna=False).iloc[0] >= _ALIKE * len(rows))
+    walked = alike and table == "motion" and _are_steps(rows)
+    spread = times_of_cut_seconds(time_s, equal, alike=alike, walked=walked)
     if spread is time_s:
         return rows, ""
     some = number_of(int(equal.sum()), "row equals", "rows equal")
     note = f"{table}: {some} another one of the same second, as stamps are whole seconds: kept, and"
     return _as_counter(table, rows.assign(time_s=spread)), f"{note} spread over it"
+
+
+def _are_steps(rows: pd.DataFrame) -> bool:
+    """Return whether rows have the lengths of steps, as often as a walker makes them."""
+    length_m, per_s = rows["step_m"].median(), len(rows) / rows["time_s"].nunique()
+    return bool(
+        _STEP_M[0] <= length_m <= _STEP_M[1] and _STEPS_PER_S[0] <= per_s <= _STEPS_PER_S[1]
+    )
 
 
 def _as_counter(table: str, rows: pd.DataFrame) -> pd.DataFrame:

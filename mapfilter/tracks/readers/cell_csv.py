@@ -148,14 +148,19 @@ def _levels(rows: Columns, reading: Reading, families: np.ndarray, dialect: _Dia
     reading.tallies.signs.add(given[(given < _UNAVAILABLE) & (families != "NR")])
     left = np.isnan(level) & (given > 0) & (given < _UNAVAILABLE) & ~np.isin(given, UNKNOWN_ASU)
     if left.any():
-        reading.ignore(
-            f"radio, level_dbm: {number_of(int(left.sum()), 'level')} as ASU of an unknown "
-            f"technology, or beyond its scale, ignored (first in line {rows.line[left][0]})"
+        first = rows.line[left][0]
+        reading.count(
+            lambda n: (
+                f"radio, level_dbm: {number_of(n, 'level')} as ASU of an unknown "
+                f"technology, or beyond its scale, ignored (first in line {first})"
+            ),
+            int(left.sum()),
+            key="ASU of an unknown technology",
+            ignored=True,
         )
     if turned:
-        reading.note(
-            f"radio, level_dbm: {number_of(turned, 'level')} given as ASU, turned into dBm"
-        )
+        asu_dbm = "given as ASU, turned into dBm"
+        reading.count(lambda n: f"radio, level_dbm: {number_of(n, 'level')} {asu_dbm}", turned)
     return level
 
 

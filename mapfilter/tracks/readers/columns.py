@@ -266,10 +266,18 @@ class Columns:
         examples = pc.unique(pc.filter(column, odd))[:2].to_pylist()
         self.reading.tallies.add_texts(name, part, pc.sum(good).as_py() + count, count, examples)
         if bad:
-            some = number_of(bad, "value is no number", "values are no numbers")
             at = pc.index(wrong, value=True).as_py()
             first = f"first {column[at].as_py()[:40]!r} in line {self.line[at]}"
-            self.reading.ignore(f"{name}: {some}, taken as missing ({first})")
+            self.reading.count(
+                lambda n: (
+                    f"{name}: {number_of(n, 'value is no number', 'values are no numbers')}, "
+                    f"taken as missing ({first})"
+                ),
+                bad,
+                key=f"{name}, {kind}",
+                source=part,
+                ignored=True,
+            )
         column = pc.replace_substring_regex(column, r"^\+", "")
         return pc.cast(pc.if_else(good, column, None), kind)
 

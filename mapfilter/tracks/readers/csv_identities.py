@@ -110,7 +110,15 @@ def _note_others(
     others = others & (texts != "")
     if others.any():
         at = int(np.argmax(others))
-        some = number_of(int(others.sum()), "value is", "values are")
         first = f"first {str(texts[at])[:40]!r} in line {mapped.rows.line[at]}"
         name = mapped.rows.find(*mapped.names(field))
-        mapped.rows.reading.ignore(f"{name}: {some} no {expected}, taken as missing ({first})")
+        mapped.rows.reading.count(
+            lambda n: (
+                f"{name}: {number_of(n, 'value is', 'values are')} no {expected}, "
+                f"taken as missing ({first})"
+            ),
+            int(others.sum()),
+            key=f"{name}, no {expected}",
+            source=int(mapped.rows.line[0]),
+            ignored=True,
+        )

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
+import pandas as pd
 
 from mapfilter._constants import KMH_MPS
 from mapfilter._types import Floats
@@ -107,25 +109,68 @@ def add_odometry(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
             _note_speeds(mapped, reading)
         return
     _note_units(mapped, reading)
-    speed, speed_sd_mps = _speeds(mapped, reading, time_s)
     rates = mapped.radians("yaw_rate", "ps")
-    yaw = _at_speeds(reading, time_s, speed, rates)
+    rows = pd.DataFrame({"time_s": time_s, "yaw_rate_radps": rates, "line": mapped.rows.line})
+    heading = heading_of_wheels(mapped)
+    if heading:
+        reading.note(f"{mapped.rows.find(*mapped.names(heading))}: headings of the vehicle")
+        rows = rows.assign(heading=mapped.number(heading))
+    odometer = _odometer(mapped, reading)
+    if not odometer:
+        _add_driven(reading, rows, heading, _speeds(mapped, reading), float("nan"))
+        return
+    # A part of a large file does not show how an odometer grows at its ends.
+    unit = mapped.unit(odometer)
+    factor = 1.0 if unit is None else unit.factor
+    unit_m = (1000.0 if odometer == "odometer_km" else 1.0) * factor
+    column = mapped.rows.find(*mapped.names(odometer)) or ""
+    ending = partial(_add_counted, reading, heading, column, unit_m)
+    reading.keep(rows.assign(count=mapped.number(odometer) / factor), ending)
+
+
+def _add_counted(
+    reading: Reading, heading: str, column: str, unit_m: float, rows: pd.DataFrame
+) -> None:
+    """Add all rows of a file with the count of an odometer."""
+    way = counted_way(rows["time_s"].to_numpy(), rows["count"].to_numpy(), unit_m)
+    text = f"{column}: an odometer, speeds are those by which it grows"
+    if way.least_m > _COARSE_M:
+        text += f", in counts of {way.least_m:.3g} m"
+    for count, what in ((way.wraps, "wraps around"), (way.resets, "begins anew or jumps")):
+        if count:
+            text += f"; it {what} {number_of(count, 'time')}"
+    reading.note(text)
+    _add_driven(reading, rows, heading, way.speed_mps, way.speed_sd_mps)
+
+
+def _add_driven(
+    reading: Reading, rows: pd.DataFrame, heading: str, speed: Floats, speed_sd_mps: float
+) -> None:
+    """Add rows with a speed, a yaw rate or a heading of the vehicle.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        time_s, yaw_rate_radps, line and, where ``heading`` is a field, heading.
+    """
+    time_s = rows["time_s"].to_numpy()
+    yaw = _at_speeds(reading, time_s, speed, rows["yaw_rate_radps"].to_numpy())
     columns = {"time_s": time_s, "speed_mps": speed, "yaw_rate_radps": yaw}
     columns["speed_sd_mps"] = np.full(len(speed), speed_sd_mps)
-    headed = np.zeros(len(speed), dtype=np.bool_)
-    if heading := heading_of_wheels(mapped):
-        given = mapped.number(heading)
+    there = np.isfinite(speed)
+    if not there.any():
+        return
+    there |= np.isfinite(yaw) & (np.abs(yaw) <= FASTEST_TURN_RADPS)
+    if heading:
+        given = rows["heading"].to_numpy()
         if heading == "course_deg":
             # Of a receiver that stands the course is noise.
             moving_mps = np.abs(_between_rows(time_s, speed))
             given = np.where(moving_mps >= _COURSE_MPS, given, np.nan)
         columns["heading_rad" if heading == "heading_rad" else "compass_deg"] = given
-        headed = np.isfinite(given)
-        reading.note(f"{mapped.rows.find(*mapped.names(heading))}: headings of the vehicle")
-    if not np.isfinite(speed).any():
-        return
-    turns = np.isfinite(yaw) & (np.isfinite(speed) | (np.abs(yaw) <= FASTEST_TURN_RADPS))
-    add_rows(reading, "odometry", columns, mapped.rows, np.isfinite(speed) | turns | headed)
+        there |= np.isfinite(given)
+    kept = {name: values[there] for name, values in columns.items()}
+    reading.add("odometry", kept, rows["line"].to_numpy()[there])
 
 
 def _between_rows(time_s: Floats, speed: Floats) -> Floats:
@@ -137,38 +182,25 @@ def _between_rows(time_s: Floats, speed: Floats) -> Floats:
     return np.where(np.isfinite(speed), speed, np.interp(time_s, time_s[known], speed[known]))
 
 
-def _speeds(mapped: Mapped, reading: Reading, time_s: Floats) -> tuple[Floats, float]:
-    """Return speeds of the wheels, else by their odometer, else any; and their deviation."""
+def _odometer(mapped: Mapped, reading: Reading) -> str:
+    """Return the field of an odometer that gives the speeds; "" where the wheels do, or none."""
     odometer = _first_held(mapped, _ODOMETERS)
-    by_wheels = any(map(mapped.holds, _WHEELS))
-    if odometer and not by_wheels:
-        return _counted(mapped, reading, time_s, odometer)
-    if odometer:
-        column = mapped.rows.find(*mapped.names(odometer))
-        reading.ignore(f"{column}: not used beside the speeds of the wheels")
+    if not (odometer and any(map(mapped.holds, _WHEELS))):
+        return odometer
+    column = mapped.rows.find(*mapped.names(odometer))
+    reading.ignore(f"{column}: not used beside the speeds of the wheels")
+    return ""
+
+
+def _speeds(mapped: Mapped, reading: Reading) -> Floats:
+    """Return speeds of the wheels, else any."""
     # Beside positions a speed is the receiver's, and beside steps a walker's.
-    by_wheels |= any(map(mapped.has, _WHEELS)) and (
-        _is_placed(mapped) or any(map(mapped.has, _STEPS))
+    by_wheels = any(map(mapped.holds, _WHEELS)) or (
+        any(map(mapped.has, _WHEELS)) and (_is_placed(mapped) or any(map(mapped.has, _STEPS)))
     )
     if not by_wheels:
         reading.note("speed: taken for a vehicle's, as there are no positions beside it")
-    return speeds_of(mapped, "wheel_speed" if by_wheels else "speed"), float("nan")
-
-
-def _counted(mapped: Mapped, reading: Reading, time_s: Floats, field: str) -> tuple[Floats, float]:
-    """Return the speeds by which an odometer grows, and their standard deviation."""
-    column = mapped.rows.find(*mapped.names(field))
-    unit = mapped.unit(field)
-    unit_m = (1000.0 if field == "odometer_km" else 1.0) * (1.0 if unit is None else unit.factor)
-    way = counted_way(time_s, mapped.number(field) / (1.0 if unit is None else unit.factor), unit_m)
-    text = f"{column}: an odometer, speeds are those by which it grows"
-    if way.least_m > _COARSE_M:
-        text += f", in counts of {way.least_m:.3g} m"
-    for count, what in ((way.wraps, "wraps around"), (way.resets, "begins anew or jumps")):
-        if count:
-            text += f"; it {what} {number_of(count, 'time')}"
-    reading.note(text)
-    return way.speed_mps, way.speed_sd_mps
+    return speeds_of(mapped, "wheel_speed" if by_wheels else "speed")
 
 
 def speeds_of(mapped: Mapped, name: str) -> Floats:
@@ -216,8 +248,12 @@ def _note_speeds(mapped: Mapped, reading: Reading) -> None:
     place = mapped.number("lat_deg" if mapped.has("lat_deg") else "east_m")
     measured, alone = np.isfinite(speed), np.isfinite(speed) & ~np.isfinite(place)
     if (count := int(alone.sum())) >= max(_FEWEST_ALONE, _ALONE_SHARE * measured.sum()):
-        some = f"{count} of {number_of(int(measured.sum()), 'speed')}"
-        reading.ignore(f"{column}: {some} without a position in the row, not used; {option}")
+        why = f"without a position in the row, not used; {option}"
+        reading.count(
+            lambda n, of: f"{column}: {n} of {number_of(of, 'speed')} {why}",
+            *(count, int(measured.sum())),
+            ignored=True,
+        )
 
 
 def _at_speeds(reading: Reading, time_s: Floats, speed: Floats, yaw: Floats) -> Floats:
@@ -231,8 +267,8 @@ def _at_speeds(reading: Reading, time_s: Floats, speed: Floats, yaw: Floats) -> 
     known = possible & np.isfinite(time_s)
     alone = np.isfinite(yaw) & ~possible & ~np.isfinite(speed)
     if count := int(alone.sum()):
-        some = number_of(count, "yaw rate")
-        reading.ignore(f"{some} beyond {FASTEST_TURN_RADPS:g} rad/s in rows without speeds")
+        beyond = f"beyond {FASTEST_TURN_RADPS:g} rad/s in rows without speeds"
+        reading.count(lambda n: f"{number_of(n, 'yaw rate')} {beyond}", count, ignored=True)
     if not wanted.any() or not known.any():
         return yaw
     order = np.argsort(time_s[known], kind="stable")
@@ -246,5 +282,6 @@ def _at_speeds(reading: Reading, time_s: Floats, speed: Floats, yaw: Floats) -> 
     joined = yaw.copy()
     joined[wanted] = found
     if count := int(np.isfinite(found).sum()):
-        reading.note(f"{number_of(count, 'yaw rate')} taken from rows beside those with speeds")
+        beside = "taken from rows beside those with speeds"
+        reading.count(lambda n: f"{number_of(n, 'yaw rate')} {beside}", count)
     return joined

@@ -115,9 +115,8 @@ def _signed(mapped: Mapped, reading: Reading, degrees: Floats, field: str, colum
     _check_steady(mapped, reading, degrees, letters, column)
     wrong = other & (degrees > 0)
     if count := int(wrong.sum()):
-        reading.note(
-            f"{field}: {number_of(count, 'value')} of {letter} by column {column}: negative"
-        )
+        of = f"of {letter} by column {column}: negative"
+        reading.count(lambda n: f"{field}: {number_of(n, 'value')} {of}", count)
     return np.where(wrong, -degrees, degrees)
 
 

@@ -58,8 +58,10 @@ def _add_positions(
     new = np.ones(len(rows), dtype=bool)
     new[1:] = (np.diff(lat) != 0) | (np.diff(lon) != 0)
     if (repeats := int((~new).sum())) > 0:
-        some = number_of(repeats, "row repeats", "rows repeat")
-        reading.note(f"positions: {some} the position before, left out")
+        why = "the position before, left out"
+        reading.count(
+            lambda n: f"positions: {number_of(n, 'row repeats', 'rows repeat')} {why}", repeats
+        )
     columns = {
         "time_s": time_s,
         "lat_deg": lat,
@@ -88,8 +90,12 @@ def _serving(rows: Columns, reading: Reading) -> dict[str, Floats]:
     # The program writes 0 where the phone does not know its cell.
     unknown = ci == 0
     if unknown.any():
-        some = number_of(int(unknown.sum()), "row has", "rows have")
-        reading.ignore(f"radio: {some} a cell id of 0, which is no identity")
+        of = "a cell id of 0, which is no identity"
+        reading.count(
+            lambda n: f"radio: {number_of(n, 'row has', 'rows have')} {of}",
+            int(unknown.sum()),
+            ignored=True,
+        )
     ci = np.where(unknown, np.nan, ci)
     mcc, mnc = (np.full(len(rows), np.nan) for _ in range(2))
     for word in pd.unique(operator):
@@ -174,7 +180,9 @@ def _add_neighbours(rows: Columns, reading: Reading, time_s: Floats, good: Bools
         kept = {name: values[there] for name, values in columns.items()}
         add_radio(reading, {**kept, "role": "neighbour"}, rows.line[there])
     if false:
-        reading.note(f"radio: {false} neighbours are no cells (a dump for a code), left out")
+        reading.count(
+            lambda n: f"radio: {n} neighbours are no cells (a dump for a code), left out", false
+        )
 
 
 def _codes(texts: np.ndarray) -> Floats:

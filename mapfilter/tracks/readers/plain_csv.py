@@ -26,6 +26,7 @@ from mapfilter.tracks.readers.csv_mapped import (
 from mapfilter.tracks.readers.csv_odometry import add_odometry, add_turns
 from mapfilter.tracks.readers.csv_places import add_places, hemisphere_columns
 from mapfilter.tracks.readers.csv_steps import add_steps, are_counted
+from mapfilter.tracks.readers.csv_technology import with_technologies
 from mapfilter.tracks.readers.csv_times import times_of
 from mapfilter.tracks.readers.csv_unused import unused_columns, unused_note
 from mapfilter.tracks.readers.csv_weeks import week_column
@@ -90,7 +91,7 @@ def read_columns(rows: Columns, reading: Reading, options: ReadOptions) -> None:
         A field or column that does not exist, a unit of another quantity in a name, no times.
     """
     rows = with_full_names(rows, {name.lower() for name in options.columns.values()})
-    mapped = with_dates(mapped_columns(rows, reading, options))
+    mapped = with_dates(with_technologies(mapped_columns(rows, reading, options), reading))
     rows = mapped.rows
     hemispheres = hemisphere_columns(rows, mapped.taken)
     week = week_column(mapped)

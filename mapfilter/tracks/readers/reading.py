@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
@@ -28,6 +28,7 @@ from mapfilter.tracks.readers.recorded_values import (
     reordered,
 )
 from mapfilter.tracks.readers.recording import Clock, Recording
+from mapfilter.tracks.readers.remarks import CountedNotes, Remarks, number_or_share
 from mapfilter.tracks.readers.set_back import set_back_by
 from mapfilter.tracks.readers.tables import RECORDED
 from mapfilter.tracks.readers.tallies import Tallies
@@ -47,13 +48,14 @@ _SEVERAL = ("radio", "satellites", "ephemerides")
 
 
 @dataclass(slots=True)
-class Reading:
+class Reading(Remarks):
     """Collects the tables, bad rows and notes of one file while it is read.
 
     ``last_s`` is the last time of the file's rows, used or not, and ``passed_s`` that of the parts
     read so far, of formats without ``last_s``; ``columns`` are the names in the file of columns
     without a usual name, by field. ``doubled`` is by how much all times so far may be later, as of
-    :func:`mapfilter.tracks.readers.local_times.doubled_s`, and the note on it.
+    :func:`mapfilter.tracks.readers.local_times.doubled_s`, and the note on it. ``kept`` are rows
+    that ``ending`` takes when all parts are read.
     """
 
     path: Path
@@ -72,6 +74,9 @@ class Reading:
     passed_s: float = -inf
     doubled: tuple[float, str] = (0.0, "")
     columns: dict[str, str] = field(default_factory=dict)
+    kept: list[pd.DataFrame] = field(default_factory=list)
+    ending: Callable[[pd.DataFrame], None] | None = None
+    counted: CountedNotes = field(default_factory=CountedNotes)
     _firsts: dict[str, str] = field(default_factory=dict)
     _refused: dict[str, list[Ints]] = field(default_factory=dict)
 
@@ -82,17 +87,6 @@ class Reading:
             if first is not None:
                 self._firsts.setdefault(reason, f"{first:.10g}")
             self._refused.setdefault(reason, []).append(found)
-
-    def note(self, text: str) -> None:
-        """Add a remark, once."""
-        if text not in self.notes:
-            self.notes.append(text)
-
-    def ignore(self, text: str) -> None:
-        """Add a remark on values that are left out."""
-        self.note(text)
-        if text not in self.ignored:
-            self.ignored.append(text)
 
     def add(self, table: str, columns: Mapping[str, Any], lines: ArrayLike) -> None:
         """Check rows of a table, and keep the usable ones.
@@ -129,13 +123,22 @@ class Reading:
         if back := int(np.sum(steps_s < 0)):
             cause = set_back_by(-steps_s[steps_s < 0], self.clock)
             why = f" (likely: {cause})" if cause else ""
-            self.note(f"{table}: times go backwards in {number_of(back, 'place')}; sorted{why}")
+            self.count(
+                lambda n: f"{table}: times go backwards in {number_of(n, 'place')}; sorted{why}",
+                back,
+            )
         self.tables.setdefault(table, []).append(rows)
 
     def shift(self, later_s: float) -> None:
         """Make the times of all rows so far later."""
         for parts in self.tables.values():
             parts[:] = [part.assign(time_s=part["time_s"] + later_s) for part in parts]
+        self.kept[:] = [part.assign(time_s=part["time_s"] + later_s) for part in self.kept]
+
+    def keep(self, rows: pd.DataFrame, ending: Callable[[pd.DataFrame], None]) -> None:
+        """Keep rows of a part of the file; ``ending`` takes those of all when it is read."""
+        self.kept.append(rows)
+        self.ending = ending
 
     def _check(
         self, table: str, known: Field, checked: dict[str, Any], line: Ints, good: Bools
@@ -148,8 +151,11 @@ class Reading:
         else:
             missing = np.isnan(values)
             if (noise := known.is_noise(values)).any():
-                some = f"{number_of(int(noise.sum()), 'value')} just below {known.low:g}"
-                self.note(f"{table}, {known.name}: {some}, taken for {known.low:g}")
+                least = f"just below {known.low:g}, taken for {known.low:g}"
+                self.count(
+                    lambda n: f"{table}, {known.name}: {number_of(n, 'value')} {least}",
+                    int(noise.sum()),
+                )
                 values = checked[known.name] = np.where(noise, known.low, values)
             outside = ~missing & ~((values >= known.low) & (values <= known.high))
             if known.turn and not missing.all():
@@ -169,7 +175,7 @@ class Reading:
             return ~missing & ~outside
         if (ignored := good & outside).any():
             first = line[ignored][0]
-            some = number_of(int(ignored.sum()), "value is", "values are")
+            numbers = [int(ignored.sum())]
             # Elsewhere few bad values say nothing of their cause.
             hint = known.mistake(float(np.abs(values[ignored]).max())) if known.marks > 1 else ""
             hint = hint or self._doubt(table, known, int(ignored.sum()), line.size)
@@ -178,9 +184,16 @@ class Reading:
             if known.is_another(values[ignored], given):
                 # What is left of another quantity is none of this one either.
                 outside = ~missing
-                some = f"{int(ignored.sum())} of {number_of(given, 'value')} are"
+                numbers.append(given)
                 where += "; the whole column"
-            self.ignore(f"{label}: {some} not {known.expected}, ignored ({where})")
+            self.count(
+                lambda n, of=None: (
+                    f"{label}: {number_or_share(n, of)} not {known.expected}, ignored ({where})"
+                ),
+                *numbers,
+                key=f"{label}, {len(numbers)}",
+                ignored=True,
+            )
             checked[known.name] = np.where(outside, np.nan, values)
         return np.ones(len(line), dtype=bool)
 
@@ -191,8 +204,8 @@ class Reading:
         values = self.tallies.winding(table, known).unwound(values, outside)
         left = outside & ~(np.abs(values) <= known.high)
         if count := int(np.count_nonzero(outside & ~left)):
-            some = number_of(count, "value")
-            self.note(f"{table}, {known.name}: {some} beyond a turn, wrapped (unwrapped)")
+            turned = "beyond a turn, wrapped (unwrapped)"
+            self.count(lambda n: f"{table}, {known.name}: {number_of(n, 'value')} {turned}", count)
         return values, left
 
     def _doubt(self, table: str, known: Field, ignored: int, rows: int) -> str:
@@ -231,6 +244,8 @@ class Reading:
         InputError
             No row can be used, or most values of a column that a log needs are out of range.
         """
+        if self.ending is not None:
+            self.ending(pd.concat(self.kept, ignore_index=True))
         found = {reason: np.unique(np.concatenate(some)) for reason, some in self._refused.items()}
         refused = tuple(
             Unusable(

@@ -62,7 +62,9 @@ def _without_headers(data: bytes, header: str, separator: str, reading: Reading)
     while again in data:
         found += data.count(again)
         data = data.replace(again, b"\n\n")
-    reading.note(f"{number_of(found, 'line repeats', 'lines repeat')} the header, left out")
+    reading.count(
+        lambda n: f"{number_of(n, 'line repeats', 'lines repeat')} the header, left out", found
+    )
     return data[1:]
 
 
