@@ -131,7 +131,9 @@ def bench(
     stage: Annotated[
         str, typer.Argument(metavar="[NAME]", help="build, filter, fusion or sweep.")
     ] = "build",
-    runs: Annotated[int, typer.Option("--runs", min=1, help="Runs; medians are reported.")] = 5,
+    runs: Annotated[
+        int | None, typer.Option("--runs", min=1, help="Runs; medians are reported. Default: 5.")
+    ] = None,
     peers: Annotated[
         bool,
         typer.Option(
@@ -154,9 +156,13 @@ def bench(
     as_json: JsonOption = False,
 ) -> None:
     """Measure how fast a stage is on this machine, or what memory it takes."""
-    from mapfilter.workflows.bench import run_bench
+    from mapfilter.workflows.bench import RUNS, run_bench
 
-    found = run_bench(stage, runs=runs, peers=peers, memory=memory, threads=threads, device=device)
+    if memory:
+        refuse({"--runs": runs}, "bench --memory")
+    found = run_bench(
+        stage, runs=runs or RUNS, peers=peers, memory=memory, threads=threads, device=device
+    )
     print_result(found, as_json)
 
 
@@ -205,7 +211,9 @@ def evaluate(
         ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of what is drawn.")] = 0,
-    workers: Annotated[int, typer.Option("--workers", min=1, help="Local processes.")] = 2,
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=1, help="Local processes. Default: 2.")
+    ] = None,
     resume: ResumeOption = False,
     config: ConfigOption = None,
     settings: SetOption = None,
@@ -228,7 +236,7 @@ def evaluate(
     from mapfilter.workflows.evaluate_single_reports import SETS, run_single_reports
 
     check_benchmark(name, data)
-    common: dict[str, Any] = {"seed": seed, "workers": workers, "resume": resume}
+    common: dict[str, Any] = {"seed": seed, "workers": workers or 2, "resume": resume}
     result: Any
     if name == "ottawa" and data is not None:
         other = None if filter_name == "bayes" else filter_name
@@ -262,6 +270,7 @@ def evaluate(
         unused = {"--map": map_file, "--bbox": bbox, "--filter": filter_name, "--config": config}
         refuse(unused | {"--world": world, "--set": settings}, name)
         refuse({"--runs": runs, "--seed": seed or None, "--resume": resume or None}, name)
+        refuse({"--workers": workers}, name)
         folder = (out or Path("out") / name).absolute()
         with nothing_left(folder), rate_bar("evaluate", "runs") as progress:
             result = run_single_reports(data, folder, sets=cases or SETS, progress=progress)
