@@ -221,6 +221,27 @@ def utm_crs(lon_deg: float, lat_deg: float) -> str:
     return utm_zone_crs(utm_zone(lon_deg, lat_deg), lat_deg)
 
 
+def utm_crs_of(lon_deg: ArrayLike, lat_deg: ArrayLike) -> str:
+    """Return the UTM zone, or UPS, of the middle of places, which may lie across 180 degrees.
+
+    Parameters
+    ----------
+    lon_deg, lat_deg : (N,) array_like
+        One place or more, all known.
+
+    Examples
+    --------
+    >>> utm_crs_of([179.9, -179.9, 179.8], [-17.0, -17.0, -17.0]), utm_crs_of([24.9], [60.2])
+    ('EPSG:32760', 'EPSG:32635')
+    """
+    lon = np.asarray(lon_deg, dtype=np.float64)
+    # The same numbers, but where these jump by a whole turn.
+    lon = lon - 360.0 * np.round((lon - lon[0]) / 360.0)
+    middle_deg = float(np.median(lon))
+    middle_deg -= 360.0 * np.round(middle_deg / 360.0)
+    return utm_crs(middle_deg, float(np.median(np.asarray(lat_deg))))
+
+
 def project(crs: str, lon_deg: ArrayLike, lat_deg: ArrayLike) -> tuple[Floats, Floats]:
     """Turn longitudes and latitudes (WGS 84, degrees) into east and north metres."""
     east, north = _from_lonlat(crs).transform(np.asarray(lon_deg), np.asarray(lat_deg))

@@ -112,6 +112,9 @@ def build(
 
     given = [*(settings or ()), *(["database.cells=false"] if roads_only else [])]
     loaded = load_config(config, given, out=out)
+    if not (loaded.database.cells or dry_run):
+        parallel = {"--workers": workers if workers > 1 else None, "--cluster": cluster}
+        refuse(parallel | {"--resume": resume or None}, "a build of roads alone")
     if dry_run:
         with named_defaults(config, given):
             estimate = run_dry_build(loaded)

@@ -40,7 +40,7 @@ class _Asked:
     data: Path | None
     runs: int | None
     seed: int
-    workers: int
+    workers: int | None
     resume: bool
     config: Path | None
     settings: list[str] | None
@@ -49,7 +49,7 @@ class _Asked:
     @property
     def of_runs(self) -> dict[str, Any]:
         """Seed, processes, and whether finished runs are kept."""
-        return {"seed": self.seed, "workers": self.workers, "resume": self.resume}
+        return {"seed": self.seed, "workers": self.workers or 2, "resume": self.resume}
 
     @property
     def folder(self) -> Path:
@@ -132,7 +132,9 @@ def evaluate(
         ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of what is drawn.")] = 0,
-    workers: Annotated[int, typer.Option("--workers", min=1, help="Local processes.")] = 2,
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=1, help="Local processes. Default: 2.")
+    ] = None,
     resume: ResumeOption = False,
     config: ConfigOption = None,
     settings: SetOption = None,
@@ -205,7 +207,7 @@ def _single_reports(asked: _Asked) -> tuple[Any, Any]:
 
     refuse(asked.of_simulation, asked.name)
     unused = {"--runs": asked.runs, "--seed": asked.seed or None, "--resume": asked.resume or None}
-    refuse(unused, asked.name)
+    refuse(unused | {"--workers": asked.workers}, asked.name)
     with nothing_left(asked.folder), rate_bar("evaluate", "runs") as progress:
         result = run_single_reports(*asked.folders, sets=asked.cases or SETS, progress=progress)
     return result, result

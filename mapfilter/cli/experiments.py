@@ -23,6 +23,7 @@ from mapfilter.cli.options import (
     check_custom_filter,
     named_defaults,
     numbers,
+    refuse,
     seeded,
 )
 from mapfilter.errors import Stopped
@@ -126,7 +127,9 @@ def bench(
     stage: Annotated[
         str, typer.Argument(metavar="[NAME]", help="build, filter, fusion or sweep.")
     ] = "build",
-    runs: Annotated[int, typer.Option("--runs", min=1, help="Runs; medians are reported.")] = 5,
+    runs: Annotated[
+        int | None, typer.Option("--runs", min=1, help="Runs; medians are reported. Default: 5.")
+    ] = None,
     peers: Annotated[
         bool,
         typer.Option(
@@ -149,7 +152,11 @@ def bench(
     as_json: JsonOption = False,
 ) -> None:
     """Measure how fast a stage is on this machine, or what memory it takes."""
-    from mapfilter.workflows.bench import run_bench
+    from mapfilter.workflows.bench import RUNS, run_bench
 
-    found = run_bench(stage, runs=runs, peers=peers, memory=memory, threads=threads, device=device)
+    if memory:
+        refuse({"--runs": runs}, "bench --memory")
+    found = run_bench(
+        stage, runs=runs or RUNS, peers=peers, memory=memory, threads=threads, device=device
+    )
     print_result(found, as_json)

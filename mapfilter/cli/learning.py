@@ -16,6 +16,7 @@ from mapfilter.cli.options import (
     SetOption,
     WorkersOption,
     given_path,
+    refuse,
     seeded,
     toml,
 )
@@ -64,6 +65,10 @@ def learn(
         if accept is None or accept == _ALL:
             hint = "journeys to learn from, or a patch to accept"
             raise fail(ConfigError, "learn", "--logs LOGS, or --accept PATCH", "neither", hint)
+        of_journeys: dict[str, object]
+        of_journeys = {"--config": config, "--set": settings, "--resume": resume or None}
+        of_journeys |= {"--workers": workers if workers > 1 else None, "--seed": seed}
+        refuse(of_journeys | {"--no-truth": None if truth else "it"}, "--accept PATCH")
         patch = given_path(Path(accept)) or Path(accept)
         with progress_bar("learn") as progress:
             accepted = run_accept(database, patch, folder, progress=progress)

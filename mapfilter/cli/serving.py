@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from mapfilter.cli.options import ConfigOption, SetOption, given_path
+from mapfilter.cli.options import ConfigOption, SetOption, given_path, refuse
 from mapfilter.errors import ConfigError, fail
 from mapfilter.workflows.progress_bars import progress_bar
 
@@ -45,8 +45,9 @@ def serve(
         ),
     ] = None,
     save_every_s: Annotated[
-        float, typer.Option("--save-every", metavar="S", help="Seconds between two savings.")
-    ] = 10.0,
+        float | None,
+        typer.Option("--save-every", metavar="S", help="Seconds between two savings. Default: 10."),
+    ] = None,
     sessions: Annotated[int, typer.Option("--sessions", help="Most sessions at a time.")] = 1000,
     idle_min: Annotated[
         float, typer.Option("--idle", metavar="MIN", help="Minutes after which a session ends.")
@@ -62,15 +63,17 @@ def serve(
     ] = 200.0,
     workers: Annotated[int, typer.Option("--workers", min=1, help="Threads that run steps.")] = 2,
     method: Annotated[
-        str,
+        str | None,
         typer.Option("--method", metavar="NAME", help="Of single reports, as locate takes it."),
-    ] = "auto",
+    ] = None,
     level_error_db: Annotated[
-        float,
+        float | None,
         typer.Option(
-            "--level-error", metavar="DB", help="Standard deviation of levels of a database."
+            "--level-error",
+            metavar="DB",
+            help="Standard deviation of levels of a database. Default: 6.",
         ),
-    ] = 6.0,
+    ] = None,
     config: ConfigOption = None,
     settings: SetOption = None,
 ) -> None:
@@ -86,6 +89,8 @@ def serve(
         raise fail(ConfigError, "serve", expected, f"no {error.name}") from error
     from mapfilter.serving.limits import ServiceLimits
 
+    if state is None:
+        refuse({"--save-every": save_every_s}, "serve without --state")
     limits = ServiceLimits(
         sessions=sessions,
         idle_s=60.0 * idle_min,
@@ -99,7 +104,7 @@ def serve(
         host_names=tuple(host_names or ()),
         token_file=token_file,
         state=state.absolute() if state is not None else None,
-        save_every_s=save_every_s,
+        save_every_s=10.0 if save_every_s is None else save_every_s,
         workers=workers,
         method=method,
         level_error_db=level_error_db,

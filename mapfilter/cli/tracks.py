@@ -41,6 +41,9 @@ from mapfilter.tracks.schema import Without
 from mapfilter.workflows.progress_bars import progress_bar, stage_bar
 from mapfilter.workflows.terminal import print_message, print_result, print_text
 
+_UNPROTECTED = "candidate"
+"""The built-in filter without protection levels."""
+
 
 def demo(
     out: OutOption = None,
@@ -113,11 +116,13 @@ def locate(
     truth: TruthOption = None,
     zone: ZoneOption = None,
     level_error_db: Annotated[
-        float,
+        float | None,
         typer.Option(
-            "--level-error", metavar="DB", help="Standard deviation of levels of a database."
+            "--level-error",
+            metavar="DB",
+            help="Standard deviation of levels of a database. Default: 6.",
         ),
-    ] = 6.0,
+    ] = None,
     out: OutOption = None,
     seed: SeedOption = None,
     as_json: JsonOption = False,
@@ -125,7 +130,7 @@ def locate(
     """Locate each report of a log by itself; exit code 3 if none has a position."""
     from mapfilter.workflows.locate import run_locate
 
-    if not 0 < level_error_db <= 60:
+    if level_error_db is not None and not 0 < level_error_db <= 60:
         raise fail(ConfigError, "--level-error", "dB > 0, at most 60", level_error_db)
     folder = (out or Path("located-reports")).absolute()
     with progress_bar("locate") as progress:
@@ -244,6 +249,9 @@ def replay(
             refuse(
                 {"--declination": declination, "--step-length": step_length}, "track.steps = false"
             )
+        if loaded.filter.smooth or loaded.filter.name == _UNPROTECTED:
+            whom = "a smoothed track" if loaded.filter.smooth else f"the filter {_UNPROTECTED}"
+            refuse({"--protection": protection}, whom)
         check_custom_filter(loaded)
         # With a configuration it is the one that `build` makes of the same file.
         if config is None and (taken := unnamed_database(loaded)) is not None:

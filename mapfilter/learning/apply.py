@@ -19,6 +19,7 @@ from mapfilter.errors import InputError, fail
 from mapfilter.lattice import Lattice
 from mapfilter.learning.patch import Change, Patch, accepted, check_patch
 from mapfilter.learning.patterns import Patterns
+from mapfilter.radio.cell_rules import RANGES
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.roads.lattice import RouteLattice
 
@@ -70,7 +71,8 @@ def apply_patch(
     Raises
     ------
     InputError
-        The patch is of another CRS, names cells that the database lacks, or leaves no cell.
+        The patch is of another CRS, names cells that the database lacks, leaves no cell, or one
+        with an EIRP that no cell has.
     OutputError
         The folder cannot be written, or holds other files than a database.
     """
@@ -117,8 +119,7 @@ def changed_by(
             gone |= set(at)
         if change.kind in ("offset", "moved") and np.isfinite(change.offset_db):
             level[at[0]] += np.float32(change.offset_db)
-            eirp_dbm = cells[at[0]].eirp_dbm + change.offset_db
-            cells[at[0]] = replace(cells[at[0]], eirp_dbm=eirp_dbm)
+            cells[at[0]] = _offset(cells[at[0]], change.offset_db, where)
     left = [number for number in range(len(cells)) if number not in gone]
     if not left:
         raise fail(InputError, where, "a cell that is left", "none")
@@ -127,6 +128,17 @@ def changed_by(
     lines = [change for change in changes if change.kind == "way"]
     grown, level = _with_ways(routes, level[left], lines)
     return Changed(after, grown, level)
+
+
+def _offset(cell: Cell, offset_db: float, where: str) -> Cell:
+    """Return a cell whose EIRP is changed; InputError where it would be none of a cell."""
+    known, eirp_dbm = RANGES["eirp_dbm"], cell.eirp_dbm + offset_db
+    if not known.holds(eirp_dbm):
+        expected = f"an EIRP in {known.low:g}..{known.high:g} dBm after it"
+        got = f"{cell.eirp_dbm:g} dBm {offset_db:+g} dB = {eirp_dbm:g} dBm"
+        hint = "an offset of another cell, or set accept = false"
+        raise fail(InputError, f"{where}, offset_db of {cell.id}", expected, got, hint)
+    return replace(cell, eirp_dbm=eirp_dbm)
 
 
 def _turned(patterns: Patterns, cell: int, turn_deg: float) -> tuple[Cell, Floats]:

@@ -13,7 +13,7 @@ import numpy as np
 from mapfilter._types import Bools, Floats, Ints, Ints32
 from mapfilter._words import counted, number_of
 from mapfilter.errors import Fault, InputError, fail, listed
-from mapfilter.geodesy import project, projected_crs, utm_crs
+from mapfilter.geodesy import project, projected_crs, utm_crs_of
 from mapfilter.survey.antennas_log import read_antennas_log
 from mapfilter.survey.measurement_files import (
     DIALECTS,
@@ -104,8 +104,8 @@ def read_measurements(
     if faults:
         raise InputError(tuple(faults))
     if crs is None:
-        lat_deg, lon_deg = np.median(np.concatenate([t.columns[1:3] for t in tables], 1), axis=1)
-        crs = utm_crs(float(lon_deg), float(lat_deg))
+        lat_deg, lon_deg = np.concatenate([t.columns[1:3] for t in tables], 1)
+        crs = utm_crs_of(lon_deg, lat_deg)
     joined = _joined(tables, projected_crs(crs), session_gap_s)
     if not strays:
         return joined

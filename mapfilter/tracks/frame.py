@@ -39,12 +39,14 @@ class Frame:
         own = [r for r in recordings if not r.crs and {"places", "true_places"} & set(r.tables)]
         stated = [r.crs for r in recordings if r.crs]
         self.lat_deg, self.lon_deg = float("nan"), float("nan")
+        # Without positions it places headings, but a frame of no place has north alone.
+        placed = bool(own or (crs and not (places or stated)))
         if places:
             every = pd.concat(places)
             middle = every.assign(lon_deg=continuous_deg(every["lon_deg"])).median()
             self.lat_deg = float(middle["lat_deg"])
             self.lon_deg = float(near_deg(middle["lon_deg"], 0.0))
-        elif origin_deg is not None:
+        elif origin_deg is not None and placed:
             self.lat_deg, self.lon_deg = origin_deg
         if origin_deg is not None:
             self.local = _LOCAL.format(lat=origin_deg[0], lon=origin_deg[1])
@@ -65,6 +67,8 @@ class Frame:
         else:
             self.crs = projected_crs(_LOCAL.format(lat=0, lon=0))
             self.notes.append("no positions: the CRS of the log is a local frame")
+        if origin_deg is not None and not placed:
+            self.notes.append("--origin has no effect: no positions in metres of a local frame")
         if (crs or stated) and not np.isfinite(self.lat_deg):
             self.lat_deg, self.lon_deg = self._middle_deg(recordings)
         if crs and not np.isfinite(self.lat_deg) and about_deg is not None:

@@ -90,6 +90,8 @@ def journey_motion(
     moved = _recorded(recordings, sensors, frame, notes)
     if moved is None and course_motion:
         moved = _course([*recordings, *true], sensors, frame, notes)
+    elif moved is not None and course_motion:
+        notes.append(f"--course-motion has no effect: {moved.source}")
     if moved is not None:
         notes += without_effect(walk, (), moved.source) if walk is not None else ()
         return moved

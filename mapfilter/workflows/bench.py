@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 CRS = "EPSG:32629"
 STAGES = ("build", "filter", "fusion", "sweep")
+RUNS = 5
 _FLOOR_DBM = -104.0
 _BLOCK_PX = 256
 
@@ -90,7 +91,7 @@ def run_bench(
     rasters: int = 10,
     side_px: int = 3000,
     points: int = 100_000,
-    runs: int = 5,
+    runs: int = RUNS,
     peers: bool = False,
     memory: bool = False,
     threads: int = 1,

@@ -24,7 +24,7 @@ from mapfilter.experiments.benchmarks.single_reports import (
     read_wifi,
     row_of,
 )
-from mapfilter.geodesy import utm_crs
+from mapfilter.geodesy import utm_crs_of
 from mapfilter.positioning.fingerprints.located import LocatedReports
 from mapfilter.positioning.fingerprints.options import AUTO
 from mapfilter.report.canvas import BLACK, GREEN, GREY, ORANGE, PURPLE, SKY
@@ -118,6 +118,6 @@ def _reader(data: Path, name: str) -> Callable[[str], Sequence[LocatedReports]]:
         training, test = read_wifi(data / WIFI_FOLDER, name)
         return lambda method: locate_wifi(training, test, method)
     sessions = [read_session(file) for file in session_files(data, name)]
-    middle = np.median([(s.lon_deg[0], s.lat_deg[0]) for s in sessions], axis=0)
-    crs = utm_crs(float(middle[0]), float(middle[1]))
+    starts_deg = np.array([(s.lon_deg[0], s.lat_deg[0]) for s in sessions])
+    crs = utm_crs_of(*starts_deg.T)
     return lambda method: list(locate_sessions(sessions, crs, method))

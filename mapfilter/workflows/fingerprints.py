@@ -10,6 +10,7 @@ from mapfilter._words import number_of
 from mapfilter.database.manifest import MANIFEST
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail, noted
+from mapfilter.geodesy import short_crs
 from mapfilter.positioning.fingerprints.reports import Reports
 from mapfilter.positioning.fingerprints.sources import (
     is_table,
@@ -30,26 +31,32 @@ from mapfilter.tracks.readers.text import read_text
 from mapfilter.tracks.store import is_log
 
 _PEEKED_BYTES = 1 << 18
+_LEVEL_ERROR_DB = 6.0
 WITHOUT_STEPS = OpenOptions(combine=CombineOptions(walk=None))
 """Single reports need no motion."""
 
 
 def read_database(
-    path: Path, crs: str | None, level_error_db: float
+    path: Path, crs: str | None, level_error_db: float | None
 ) -> tuple[Reports, CellPlan | None]:
     """Return a radio-route database, or fingerprints, as reports; and the plan of the former.
 
     Raises
     ------
     MapfilterError
-        There is none of these, or it is damaged.
+        There is none of these, it is damaged, or a CRS or an error is given that it does not take.
     """
     if not path.exists():
         expected = "a radio-route database, or logs or a table of reports whose places are known"
         raise fail(InputError, str(path), expected, "nothing", "a mistyped path")
     if (path / MANIFEST).is_file():
         opened = open_database(path)
-        return reports_of_database(opened, level_error_db), opened.plan
+        _refuse("--crs", crs, path, f"none, as it is in {short_crs(opened.lattice.crs)}")
+        error_db = _LEVEL_ERROR_DB if level_error_db is None else level_error_db
+        return reports_of_database(opened, error_db), opened.plan
+    _refuse("--level-error", level_error_db, path, "a radio-route database, whose levels have one")
+    if not _is_fingerprints(path) and all(is_log(one) for one in _journeys(path)):
+        _refuse("--crs", crs, path, "none, as track logs have theirs")
     return read_reports(path, crs)[0], None
 
 
@@ -76,15 +83,18 @@ def read_reports(
     InputError
         With the faults of all logs.
     ConfigError
-        There is a zone or a ground truth for what is no recording, or for several.
+        There is a zone, a column or a ground truth for what is no recording, or a zone or a ground
+        truth for several.
     """
     if not options.columns and _is_fingerprints(path):
         _check_recording(path, "a table of fingerprints", options)
         return read_fingerprint_table(path, crs), ()
     journeys = _journeys(path)
-    if is_log(path) or (options.combine.truth and len(journeys) > 1):
-        own = "a track log" if is_log(path) else number_of(len(journeys), "journey")
-        _check_recording(path, own, options)
+    several = number_of(len(journeys), "journey")
+    if all(is_log(one) for one in journeys):
+        _check_recording(path, several if len(journeys) > 1 else "a track log", options)
+    elif options.combine.truth and len(journeys) > 1:
+        _check_recording(path, several, replace(options, columns={}))
     faults, logs, names = Faults(), list[TrackLog](), list[str]()
     for one in journeys:
         try:
@@ -101,10 +111,21 @@ def read_reports(
         return reports_of_logs(logs, plan), names
 
 
+def _refuse(option: str, given: object, path: Path, expected: str) -> None:
+    """Refuse an option that has no effect on a database."""
+    if given is not None:
+        raise fail(ConfigError, f"{option} of {path}", expected, str(given))
+
+
 def _check_recording(path: Path, got: str, options: OpenOptions) -> None:
     """Refuse options that only one recording can have."""
     faults = Faults()
-    for option, given in (("--zone", options.zone), ("--truth", options.combine.truth)):
+    of_recordings = {
+        "--zone": options.zone,
+        "--truth": options.combine.truth,
+        "--column": options.columns,
+    }
+    for option, given in of_recordings.items():
         if given:
             faults.add(f"{option} of {path}", "a recording of one journey", got)
     faults.raise_if_any(ConfigError)

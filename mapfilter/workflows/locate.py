@@ -90,7 +90,7 @@ def run_locate(
     columns: Mapping[str, str] | None = None,
     zone: str = "",
     truth: Sequence[Path] = (),
-    level_error_db: float = 6.0,
+    level_error_db: float | None = None,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> LocateResult:
@@ -113,8 +113,8 @@ def run_locate(
         Where the log is a recording: zone of local times that state none.
     truth : sequence of Path
         Recordings whose positions are the truth of the log, a recording.
-    level_error_db : float
-        Of the levels of a radio-route database.
+    level_error_db : float, optional
+        Of the levels of a radio-route database; 6 when left out.
     seed : int
         Of the reports by which regions of a radio-route database are calibrated.
 
@@ -122,7 +122,7 @@ def run_locate(
     ------
     MapfilterError
         An input is missing or wrong, there is no such method, or the output cannot be written, as
-        where it holds the figures of another command.
+        where it holds the figures of another command; or an option has no effect on the database.
     """
     began_s = time.perf_counter()
     check_out_apart(out, [database, log])
@@ -163,7 +163,7 @@ def _inputs(
     database: Path,
     log: Path,
     crs: str | None,
-    level_error_db: float,
+    level_error_db: float | None,
     options: OpenOptions,
 ) -> tuple[Reports, tuple[Reports, Sequence[str]]]:
     """Read both inputs, and report the faults of both."""

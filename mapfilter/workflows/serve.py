@@ -58,10 +58,10 @@ class ServeOptions:
         Time between saving what is new.
     workers : int
         Threads that run steps.
-    method : str
-        Of single reports, as ``mapfilter locate`` takes it.
-    level_error_db : float
-        Standard deviation of predicted levels, for single reports.
+    method : str or None
+        Of single reports, as ``mapfilter locate`` takes it; None for "auto".
+    level_error_db : float or None
+        Standard deviation of predicted levels, for single reports; None for 6.
     """
 
     host: str = "127.0.0.1"
@@ -71,9 +71,14 @@ class ServeOptions:
     state: Path | None = None
     save_every_s: float = 10.0
     workers: int = 2
-    method: str = AUTO
-    level_error_db: float = 6.0
+    method: str | None = None
+    level_error_db: float | None = None
     limits: ServiceLimits = field(default_factory=ServiceLimits)
+
+    @property
+    def error_db(self) -> float:
+        """Standard deviation of predicted levels."""
+        return 6.0 if self.level_error_db is None else self.level_error_db
 
     def check(self) -> None:
         """Raise ConfigError with all faults of the numbers."""
@@ -87,7 +92,7 @@ class ServeOptions:
             ("--body", limits.body_bytes >> 10, 1, 65_536),
             ("--rate", limits.rate_per_s, 0.01, 1e6),
             ("--save-every", self.save_every_s, 0.01, 1e5),
-            ("--level-error", self.level_error_db, 1e-3, 60),
+            ("--level-error", self.error_db, 1e-3, 60),
         )
         for name, value, low, high in ranges:
             if not low <= value <= high:
@@ -204,7 +209,14 @@ def _geolocator(
     database: RadioRouteDatabase, options: ServeOptions, progress: Progress | None
 ) -> Geolocator | None:
     if not database.cell_ids:
+        given = {"--method": options.method, "--level-error": options.level_error_db}
+        faults = Faults()
+        for option, value in given.items():
+            if value is not None:
+                faults.add(option, "nothing, as a database without cells locates no reports", value)
+        faults.raise_if_any(ConfigError)
         return None
-    known = reports_of_database(database, options.level_error_db)
-    fitted = fit_locator(known, options.method, np.random.default_rng(0), progress=progress)
+    known = reports_of_database(database, options.error_db)
+    method = options.method or AUTO
+    fitted = fit_locator(known, method, np.random.default_rng(0), progress=progress)
     return geolocator(fitted, database.plan)

@@ -258,3 +258,16 @@ def test_all_cells_dead_is_refused(database, tmp_path):
     every = tuple(Change("dead", (name,)) for name in database.plan.ids)
     with pytest.raises(InputError, match="a cell that is left"):
         patched(database, tmp_path, *every)
+
+
+@pytest.mark.parametrize("after", [95, -35])
+def test_an_eirp_that_no_cell_has_is_named_by_its_offset(database, tmp_path, after):
+    """It spoke of watts given for dBm, and of no offset."""
+    given = after - database.plan["S1A"].eirp_dbm
+    with pytest.raises(InputError) as refused:
+        patched(database, tmp_path, Change("offset", ("S1A",), offset_db=given))
+    message = str(refused.value)
+    expected = "expected an EIRP in -30..80 dBm after it"
+    assert message.startswith(f"patch, offset_db of S1A: {expected}")
+    assert f"{given:+g} dB = {after} dBm" in message
+    assert "watts" not in message

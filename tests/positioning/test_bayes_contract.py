@@ -20,6 +20,7 @@ from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.options import GridFilter as GridOptions
 from mapfilter.positioning.bayes.timing import TimingSource
 from mapfilter.positioning.loop import estimate_of, locate
 from mapfilter.positioning.merging import epochs
@@ -71,6 +72,20 @@ def test_measurements_that_no_source_uses_are_labelled(positioner):
     labelled = [one for one in unused if one.reason is Reason.NOT_USED_BY_FILTER]
     assert labelled == [UnusedReading(3.0, "tdoa", "", Reason.NOT_USED_BY_FILTER, 2)]
     assert {"motion", "serving", "neighbour", "gnss", "pseudorange", "tdoa"} <= positioner.uses
+
+
+def test_a_grid_uses_no_pseudoranges(area):
+    """It said that it does, so that each satellite of each epoch was listed as not used."""
+    rows = {"time_s": [3.0, 3.0, 4.5], "satellite": ["G01", "G02", "G01"], "pseudorange_m": 2e7}
+    rows |= {"sigma_m": 3.0, "x_m": 2e7, "y_m": 1e7, "z_m": 1e7}
+    log = walk_log([(EAST, 50)], pseudoranges=pd.DataFrame(rows))
+    grid = GridOptions().over_area(area)
+    assert "pseudorange" not in grid.uses
+    assert grid.uses | {"pseudorange"} == BayesFilter().over_area(area).uses
+    found = locate(log, grid, np.random.default_rng(0)).estimate
+    labelled = [one for one in found.unused if one.kind == "pseudorange"]
+    assert labelled == [UnusedReading(3.0, "pseudorange", "", Reason.NOT_USED_BY_FILTER, 3)]
+    assert 4.5 not in found.time_s
 
 
 def test_a_filter_that_breaks_the_contract_is_found(area):

@@ -129,3 +129,13 @@ def test_degrees_far_outside_of_a_crs_are_named_with_their_row(tmp_path):
     path.write_text("lon,lat,AP1\n25.0,60.2,-70\n-100.0,60.2,-71\n")
     with pytest.raises(InputError, match=r"a\.csv, row 2: expected a position that .* covers"):
         read_fingerprint_table(path, "EPSG:3067")
+
+
+def test_degrees_across_180_are_of_one_side(tmp_path):
+    """The zone was that of their middle, 0, which does not cover them."""
+    rows = [f"{lon},-17.0,-50,-60" for lon in (179.98, 179.99, -179.99, -179.98)]
+    table = tmp_path / "survey.csv"
+    table.write_text("lon,lat,WAP1,WAP2\n" + "\n".join(rows) + "\n")
+    found = read_fingerprint_table(table)
+    assert found.crs in ("EPSG:32760", "EPSG:32701")
+    assert np.ptp(found.east_m) == pytest.approx(4260, rel=0.01)

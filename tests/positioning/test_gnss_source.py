@@ -16,7 +16,7 @@ from mapfilter.positioning.epochs import Epoch, GnssFix, Pseudorange
 from mapfilter.positioning.gnss.gate import GnssComparison
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.receiver import Receiver
-from mapfilter.positioning.gnss.source import FirstFix, FirstRanges, GnssSource
+from mapfilter.positioning.gnss.source import FirstFix, FirstRanges, FixSource, GnssSource
 from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.gnss.trail import FixTrail
 from mapfilter.positioning.step_output import UnusedReading
@@ -110,7 +110,7 @@ def test_a_first_receiver_that_has_lasting_errors_says_less():
 
 @pytest.mark.parametrize(
     ("source", "given"),
-    [(SOURCE, ()), (replace(SOURCE, clock=False), ranges([(90.0, 30.0)], (0.0,))),
+    [(SOURCE, ()), (FixSource(AREA, OPTIONS), ranges([(90.0, 30.0)], (0.0,))),
      (SOURCE, ranges([(90.0, 10.0)], (0.0,)))],
 )  # fmt: skip
 def test_without_satellites_or_a_clock_a_belief_starts_without_them(source, given):

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.stats import norm
+from scipy.stats import norm, rice
 
 from mapfilter.filters.gaussian import EKF
 from mapfilter.models.ranging import position_fix
 from mapfilter.models.state import POSITION
 from mapfilter.positioning.kalman.belief import FusionHistory, SumBelief
 from mapfilter.positioning.kalman.models import compiled
-from mapfilter.positioning.kalman.place import gaussian_radii_m, share_within
+from mapfilter.positioning.kalman.place import gaussian_radii_m, mixture_radii_m, share_within
 
 COVARIANCE = np.array([[25.0, 6.0], [6.0, 16.0]])
 
@@ -251,3 +251,16 @@ def test_smoothed_parts_are_those_of_rauch_tung_and_striebel():
     alone.add(belief, np.eye(2), np.zeros((2, 2)), shifts[0])
     (one,) = alone.smoothed()
     np.testing.assert_allclose(one.mean, belief.moments.mean)
+
+
+def test_radii_are_those_of_the_mixture_about_its_mean():
+    """They were those of one Gaussian with its moments: 2509, 3173 and 5215 m about this ring."""
+    angle = np.arange(36) / 36 * 2 * np.pi
+    means = 3000.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+    ring = parts(*means, covariances=np.tile(np.diag([4e4, 4e4]), (36, 1, 1)))
+    found_m = mixture_radii_m(ring, [0, 1])
+    # The distance from the middle is Rician: of 3000 m, with 200 m about it.
+    np.testing.assert_allclose(found_m, rice.ppf([0.50, 0.67, 0.95], 15, scale=200), rtol=1e-4)
+    single = parts((5.0, 7.0))
+    one_m, _ = gaussian_radii_m(COVARIANCE, 50.0)
+    np.testing.assert_allclose(mixture_radii_m(single, [0, 1]), one_m, rtol=2e-5)

@@ -499,3 +499,12 @@ def test_strong_levels_are_levels(tmp_path):
     text = "\n".join(["cell,lat,lon,RSRP [dBm],time,accuracy_m", *rows])
     columns = {"level_dbm": "RSRP [dBm]"}
     assert len(read_measurements([write(tmp_path, text)], columns=columns)) == 30
+
+
+def test_the_zone_of_a_drive_across_180_degrees_is_of_one_side(tmp_path):
+    """The middle of 179.99 and -179.99 was 0: zone 31, on the other side of the earth."""
+    rows = [f"A,-17.0,{lon},-80" for lon in (179.97, 179.98, 179.99, -179.99, -179.98, -179.97)]
+    file = write(tmp_path, "cell,lat,lon,level_dbm\n" + "\n".join(rows) + "\n")
+    found = read_measurements([file])
+    assert found.crs in ("EPSG:32760", "EPSG:32701")
+    assert np.ptp(found.east_m) == pytest.approx(6390, rel=0.01)

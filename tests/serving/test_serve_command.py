@@ -6,8 +6,11 @@ from contextlib import closing
 import pytest
 from workflows.command_line import assert_refused, mapfilter
 
+from mapfilter.database.build import build_roads
+from mapfilter.lattice import Lattice
 from mapfilter.serving.server import listen
 from mapfilter.serving.store import SessionStore
+from mapfilter.workflows.bench import made_routes
 
 
 @pytest.fixture(scope="module")
@@ -65,3 +68,16 @@ def test_a_folder_in_use_by_another_service_is_named(database, tmp_path):
     with closing(SessionStore.in_folder(tmp_path, "another")):
         outcome = mapfilter("serve", "--db", database, "--port", 0, "--state", tmp_path)
     assert_refused(outcome, "--state", str(tmp_path), "in use")
+
+
+def test_savings_need_a_folder(database):
+    outcome = mapfilter("serve", "--db", database, "--port", 0, "--save-every", 5)
+    assert_refused(outcome, "--save-every: expected nothing, as serve without --state takes none")
+
+
+def test_over_roads_alone_no_report_is_located(tmp_path):
+    lattice = Lattice("EPSG:32635", 385_000.0, 6_672_000.0, 5.0, 100, 100)
+    build_roads(made_routes(lattice, 1000), tmp_path / "roads")
+    given = ["--method", "knn", "--level-error", 7]
+    outcome = mapfilter("serve", "--db", tmp_path / "roads", "--port", 0, *given)
+    assert_refused(outcome, "--method", "--level-error", "without cells locates no reports")

@@ -43,7 +43,7 @@ from mapfilter.positioning.epoch_checks import check_epoch
 from mapfilter.positioning.epochs import Epoch, serving_cell
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
-from mapfilter.positioning.gnss.source import FirstFix, GnssSource, gnss_of
+from mapfilter.positioning.gnss.source import FirstFix, FixSource, GnssSource, gnss_of
 from mapfilter.positioning.known_start import check_start
 from mapfilter.positioning.sensors.undirected import UndirectedWay
 from mapfilter.positioning.sensors.watch import SensorWatch
@@ -124,7 +124,7 @@ class BayesPositioner(Filter[BayesState]):
         """Kinds of measurement, in the order in which their unused readings are reported."""
         area = self.area
         return (
-            GnssSource(area, self.satellites, clock=not self.grid),
+            (FixSource if self.grid else GnssSource)(area, self.satellites),
             TimingSource(area, self.timing, self.model.timed_by_sites),
             FirstFix(area.origin_m),
             self._radio,

@@ -22,7 +22,7 @@ from mapfilter._separator_line import without_separator_line
 from mapfilter._types import Bools, Floats
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail, listed
-from mapfilter.geodesy import projected_crs, short_crs, utm_crs
+from mapfilter.geodesy import projected_crs, short_crs, utm_crs_of
 from mapfilter.positioning.fingerprints.reports import Reports, make_reports
 
 NOT_RECEIVED_DBM = 100.0
@@ -179,8 +179,7 @@ def _projected(
     largest = np.abs(places[finite]).max(axis=0, initial=0.0)
     if known and degrees and finite.any() and bool(np.all(largest <= (180.0, 90.0))):
         lon_deg, lat_deg = places.T
-        middle = np.median(places[finite], axis=0)
-        found = projected_crs(crs or utm_crs(float(middle[0]), float(middle[1])))
+        found = projected_crs(crs or utm_crs_of(*places[finite].T))
         east_m, north_m, beyond = project_within(found, lon_deg, lat_deg)
         _check_covered(path, found, places, beyond & finite)
         return found, np.column_stack([east_m, north_m])

@@ -85,14 +85,10 @@ class FirstFix(EvidenceSource):
 
 @dataclass(frozen=True)
 class GnssSource(EvidenceSource):
-    """Fixes and pseudoranges, with each radio report that is used, or on their own without one.
-
-    ``clock`` is whether hypotheses can carry a clock: those of the grid filter cannot.
-    """
+    """Fixes and pseudoranges, with each radio report that is used, or on their own without one."""
 
     area: AreaFrame
     options: GnssOptions
-    clock: bool = True
     name: ClassVar[str] = "gnss"
     kinds: ClassVar[frozenset[Kind]] = frozenset({"gnss", "pseudorange"})
     is_position: ClassVar[bool] = True
@@ -111,7 +107,7 @@ class GnssSource(EvidenceSource):
     def first(self, epoch: Epoch) -> EvidenceUpdate:
         """Return the pseudoranges, with the satellites as they stand over the area's middle."""
         state = GnssState()
-        if not epoch.ranges or not self.clock:
+        if not epoch.ranges or "pseudorange" not in self.kinds:
             return EvidenceUpdate(state)
         options, (width_m, height_m) = self.options, self.area.size_m
         middle_m = (width_m / 2, height_m / 2)
@@ -247,3 +243,10 @@ def gnss_of(state: BayesState) -> GnssState:
     """Return what a state holds of GNSS beside its main belief."""
     found: GnssState = state.sources[GnssSource.name]
     return found
+
+
+@dataclass(frozen=True)
+class FixSource(GnssSource):
+    """Fixes alone: hypotheses on a grid carry no clock, which pseudoranges need."""
+
+    kinds: ClassVar[frozenset[Kind]] = frozenset({"gnss"})

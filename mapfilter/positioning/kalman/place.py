@@ -45,6 +45,20 @@ def belief_tail(belief: SumBelief, where: list[int]) -> GaussianTail:
     return GaussianTail(belief.weights, offsets_m, belief.covariances[:, where][:, :, where])
 
 
+def mixture_radii_m(belief: SumBelief, where: list[int]) -> Floats:
+    """Return the radii about its mean that hold 50, 67 and 95 % of a Gaussian sum.
+
+    Examples
+    --------
+    >>> east_m, north_m = 3000 * np.cos([0, 1.6, 3.1, 4.7]), 3000 * np.sin([0, 1.6, 3.1, 4.7])
+    >>> ring = SumBelief.around(np.zeros(2), np.diag([9e4, 9e4]), {0: east_m, 1: north_m})
+    >>> mixture_radii_m(ring, [0, 1]).round(-2).tolist()
+    [3000.0, 3100.0, 3500.0]
+    """
+    tail = belief_tail(belief, where)
+    return np.array([tail.radius_m(share) for share in _SHARES.tolist()])
+
+
 def gaussian_radii_m(covariance_m2: Floats, within_m: float) -> tuple[Floats, float]:
     """Return the radii that hold 50, 67 and 95 %, and the share within a distance.
 

@@ -21,7 +21,13 @@ from mapfilter.positioning.kalman.fixing import FixWeighing
 from mapfilter.positioning.kalman.lasting import Motion, extended_belief, extended_motion
 from mapfilter.positioning.kalman.level_errors import with_own_spread
 from mapfilter.positioning.kalman.models import SiteModels, compiled
-from mapfilter.positioning.kalman.place import WITHIN_M, belief_tail, place_of, share_within
+from mapfilter.positioning.kalman.place import (
+    WITHIN_M,
+    belief_tail,
+    mixture_radii_m,
+    place_of,
+    share_within,
+)
 from mapfilter.positioning.kalman.proof import Doubt
 from mapfilter.positioning.kalman.readings import SiteReadings, fix_covariance_m2, site_readings
 from mapfilter.positioning.kalman.reckoning import (
@@ -272,11 +278,13 @@ class KalmanStep:
         if self.belief is None:
             return Fix.nowhere(time_s, self.status, reason)
         place = place_of(self.belief.moments, self.where)
+        # Parts far from the mean count by their variance, so that a claim waits for them.
         self._set_status(float(place["radii_m"][2]))
         count = self.belief.weights.size
         if count > 1:
             lead = self.belief.leading.covariance[np.ix_(self.where, self.where)]
             place["mass_50m"] = share_within(lead, WITHIN_M) * float(self.belief.weights.max())
+            place["radii_m"] = mixture_radii_m(self.belief, self.where)
         return Fix(time_s, **place, status=self.status, hypotheses=count, reason=reason)
 
     def _set_status(self, radius_m: float) -> None:
