@@ -35,6 +35,7 @@ if os.environ.get("NUMBA_ENABLE_CUDASIM") != "1":
 # Several have this name: as modules with doctests they could not be imported beside each other.
 collect_ignore_glob = ["*/conftest.py"]
 
+_NEW_OBJECTS = 5000
 _SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 
@@ -53,7 +54,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def pytest_collection() -> Iterator[None]:
     """Spare the search for unused cycles what stays until the end: all modules and all tests.
 
-    While these are made, nothing is there to be found.
+    While these are made, nothing is there to be found. Afterwards it comes after as many new
+    objects as in a command.
     """
     gc.disable()
     try:
@@ -61,6 +63,7 @@ def pytest_collection() -> Iterator[None]:
     finally:
         gc.enable()
         gc.freeze()
+        gc.set_threshold(_NEW_OBJECTS)
 
 
 @pytest.fixture(scope="module", autouse=True)

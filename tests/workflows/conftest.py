@@ -2,12 +2,14 @@
 
 import json
 import shutil
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from command_line import ONE, assert_done, mapfilter, settings
 
+from mapfilter.report import saving
 from mapfilter.tracks.store import read_log, write_log
 from mapfilter.workflows import replay_baseline
 
@@ -16,6 +18,12 @@ A,S1,60.16690,24.94300,30,60,50,1825.2,612,17
 B,S1,60.16690,24.94300,30,180,50,1826.4,618,17
 C,S2,60.16890,24.94880,25,240,50,1827.6,624,17
 """
+
+LOOKED_AT = {
+    "test_build_pictures", "test_cli_locate", "test_cli_reproduce", "test_cli_survey",
+    "test_drawn_beside", "test_evaluate_pictures", "test_film_command", "test_sweep_titles",
+}  # fmt: skip
+"""Tests of pictures; others ask whether there are files, and of which names."""
 
 IDENTITIES = {"A": (3021, 117001), "B": (3021, 117002), "C": (3022, 117003)}
 """LAC and CI of the cells in the plan with identities."""
@@ -109,6 +117,27 @@ def _small_baselines(request):
             patch.setattr(replay_baseline, "MOST_REPORTS", 20)
             patch.setattr(replay_baseline, "CALIBRATED_WITH", 40)
         yield
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _small_pictures(request):
+    """Draw pictures of few pixels, and do not lay them out: that takes longer than most commands.
+
+    Tests of pictures, and all of the room ``report``, have them as a user does.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        if request.path.stem not in LOOKED_AT:
+            patch.setattr(saving, "_laid_out", _not_laid_out)
+            patch.setattr(saving, "DPI", 20)
+        yield
+
+
+@contextmanager
+def _not_laid_out(figure):
+    engine = figure.get_layout_engine()
+    figure.set_layout_engine(None)
+    yield
+    figure.set_layout_engine(engine)
 
 
 @pytest.fixture(scope="session")
