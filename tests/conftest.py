@@ -79,6 +79,17 @@ def _no_waiting_for_disks(request: pytest.FixtureRequest) -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="module")
+def few_single_reports() -> Iterator[None]:
+    """Locate few single reports beside each replay: they take longer than the replay itself."""
+    from mapfilter.workflows import replay_baseline
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(replay_baseline, "MOST_REPORTS", 20)
+        patch.setattr(replay_baseline, "CALIBRATED_WITH", 40)
+        yield
+
+
 @pytest.fixture(scope="session")
 def mutation_count(request: pytest.FixtureRequest) -> int:
     """How many damaged copies of a sample a reader is fed with."""

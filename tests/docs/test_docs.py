@@ -57,6 +57,7 @@ def test_the_quickstart_has_examples():
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("few_single_reports")
 def test_quickstart_commands_run(tmp_path, monkeypatch):
     """All but the demo, which is these same steps, one after another in an empty folder."""
     text = page("quickstart.rst")

@@ -62,7 +62,8 @@ def strolled(seed, wild_db, *, fixes=True):
 
 def followed(seed, wild_db):
     log, slow_s = strolled(seed, wild_db)
-    rng, state, truth, rows = np.random.default_rng(seed), AREA.begin(), log.truth, []
+    rng, state, rows = np.random.default_rng(seed), AREA.begin(), []
+    truth = {name: log.truth[name].to_numpy() for name in ("time_s", "east_m", "north_m")}
     for epoch in epochs(log):
         state, output = AREA.step(state, epoch, rng)
         fix = output.fix

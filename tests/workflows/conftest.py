@@ -11,7 +11,6 @@ from command_line import ONE, assert_done, mapfilter, settings
 
 from mapfilter.report import saving
 from mapfilter.tracks.store import read_log, write_log
-from mapfilter.workflows import replay_baseline
 
 PLAN = """cell,site,lat,lon,height_m,azimuth_deg,eirp_dbm,frequency_mhz,arfcn,bsic
 A,S1,60.16690,24.94300,30,60,50,1825.2,612,17
@@ -108,15 +107,9 @@ def make_world(folder: Path) -> World:
 
 @pytest.fixture(scope="module", autouse=True)
 def _small_baselines(request):
-    """Locate few single reports beside each replay: they take longer than the replay itself.
-
-    Tests of this baseline locate as many as a user does.
-    """
-    with pytest.MonkeyPatch.context() as patch:
-        if request.path.stem != "test_replay_baseline":
-            patch.setattr(replay_baseline, "MOST_REPORTS", 20)
-            patch.setattr(replay_baseline, "CALIBRATED_WITH", 40)
-        yield
+    """Locate few single reports beside each replay; tests of this baseline as many as a user."""
+    if request.path.stem != "test_replay_baseline":
+        request.getfixturevalue("few_single_reports")
 
 
 @pytest.fixture(scope="module", autouse=True)
