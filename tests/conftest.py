@@ -3,7 +3,9 @@
 import gc
 import os
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 # Before NumPy is loaded. Matrices are small: threads of BLAS only wait for each other, and take the
 # processor from the other worker.
@@ -88,6 +90,30 @@ def few_single_reports() -> Iterator[None]:
         patch.setattr(replay_baseline, "MOST_REPORTS", 20)
         patch.setattr(replay_baseline, "CALIBRATED_WITH", 40)
         yield
+
+
+@pytest.fixture(scope="module")
+def small_pictures() -> Iterator[None]:
+    """Draw pictures of few pixels, and do not lay them out, which takes longer than drawing them.
+
+    For tests that ask for files and names: those of the room report have pictures as a user does.
+    """
+    from mapfilter.report import saving
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(saving, "_laid_out", _not_laid_out)
+        patch.setattr(saving, "DPI", 20)
+        yield
+
+
+@contextmanager
+def _not_laid_out(figure: Any) -> Iterator[None]:
+    engine = figure.get_layout_engine()
+    figure.set_layout_engine(None)
+    try:
+        yield
+    finally:
+        figure.set_layout_engine(engine)
 
 
 @pytest.fixture(scope="session")

@@ -42,6 +42,7 @@ def named(text: str) -> set[str]:
     return set(re.findall(r"``([^`]+)``", text))
 
 
+@pytest.mark.usefixtures("few_single_reports")
 @pytest.mark.parametrize("name", PAGES, ids=str)
 def test_examples_of_each_page(name):
     failed, _ = doctest.testfile(

@@ -29,6 +29,7 @@ def run_script(name: str, capsys: pytest.CaptureFixture[str], *given: str) -> di
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("small_pictures")
 def test_build_and_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = ["--out", str(tmp_path)]
     run_script("build_database", capsys, *SMALL, *out)

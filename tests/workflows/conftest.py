@@ -2,14 +2,12 @@
 
 import json
 import shutil
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from command_line import ONE, assert_done, mapfilter, settings
 
-from mapfilter.report import saving
 from mapfilter.tracks.store import read_log, write_log
 
 PLAN = """cell,site,lat,lon,height_m,azimuth_deg,eirp_dbm,frequency_mhz,arfcn,bsic
@@ -20,7 +18,8 @@ C,S2,60.16890,24.94880,25,240,50,1827.6,624,17
 
 LOOKED_AT = {
     "test_build_pictures", "test_cli_locate", "test_cli_reproduce", "test_cli_survey",
-    "test_drawn_beside", "test_evaluate_pictures", "test_film_command", "test_sweep_titles",
+    "test_cli_sweep", "test_drawn_beside", "test_evaluate_pictures", "test_evaluate_recorded",
+    "test_film_command", "test_sweep_titles",
 }  # fmt: skip
 """Tests of pictures; others ask whether there are files, and of which names."""
 
@@ -114,23 +113,9 @@ def _small_baselines(request):
 
 @pytest.fixture(scope="module", autouse=True)
 def _small_pictures(request):
-    """Draw pictures of few pixels, and do not lay them out: that takes longer than most commands.
-
-    Tests of pictures, and all of the room ``report``, have them as a user does.
-    """
-    with pytest.MonkeyPatch.context() as patch:
-        if request.path.stem not in LOOKED_AT:
-            patch.setattr(saving, "_laid_out", _not_laid_out)
-            patch.setattr(saving, "DPI", 20)
-        yield
-
-
-@contextmanager
-def _not_laid_out(figure):
-    engine = figure.get_layout_engine()
-    figure.set_layout_engine(None)
-    yield
-    figure.set_layout_engine(engine)
+    """Draw small pictures where they are not looked at: large ones take longer than commands."""
+    if request.path.stem not in LOOKED_AT:
+        request.getfixturevalue("small_pictures")
 
 
 @pytest.fixture(scope="session")
