@@ -2,6 +2,8 @@
 # make mutants plants small bugs and sees whether tests notice: MUTANTS="--room models --seed 2".
 PYTHON ?= python3
 MUTANTS ?= --sample 40 --seed 1
+# Processes that run tests: one for each processor, but at least two and at most four.
+TESTERS ?= $(shell n=$$(nproc 2>/dev/null || echo 2); echo $$((n < 2 ? 2 : n > 4 ? 4 : n)))
 VENV := .venv
 BIN := $(VENV)/bin
 # Also for the build backend, which pip installs apart.
@@ -19,7 +21,7 @@ demo: $(VENV)/.demo
 # processes of the tests would compile at once; the tests alone, as some of them watch a clock.
 test: $(VENV)/.test
 	$(MAKE) -j2 check docs kernels
-	$(BIN)/python -m pytest -n 2 --dist worksteal
+	$(BIN)/python -m pytest -n $(TESTERS) --dist worksteal
 
 check: $(VENV)/.test
 	$(BIN)/ruff check .

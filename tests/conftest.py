@@ -3,7 +3,9 @@
 import gc
 import os
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 # Before NumPy is loaded. Matrices are small: threads of BLAS only wait for each other, and take the
 # processor from the other worker.
@@ -35,6 +37,7 @@ if os.environ.get("NUMBA_ENABLE_CUDASIM") != "1":
 # Several have this name: as modules with doctests they could not be imported beside each other.
 collect_ignore_glob = ["*/conftest.py"]
 
+_NEW_OBJECTS = 5000
 _SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 
@@ -53,7 +56,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def pytest_collection() -> Iterator[None]:
     """Spare the search for unused cycles what stays until the end: all modules and all tests.
 
-    While these are made, nothing is there to be found.
+    While these are made, nothing is there to be found. Afterwards it comes after as many new
+    objects as in a command.
     """
     gc.disable()
     try:
@@ -61,6 +65,7 @@ def pytest_collection() -> Iterator[None]:
     finally:
         gc.enable()
         gc.freeze()
+        gc.set_threshold(_NEW_OBJECTS)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -74,6 +79,41 @@ def _no_waiting_for_disks(request: pytest.FixtureRequest) -> Iterator[None]:
             # Of a file that is not open this one fails as well.
             patch.setattr(os, "fsync", os.fstat)
         yield
+
+
+@pytest.fixture(scope="module")
+def few_single_reports() -> Iterator[None]:
+    """Locate few single reports beside each replay: they take longer than the replay itself."""
+    from mapfilter.workflows import replay_baseline
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(replay_baseline, "MOST_REPORTS", 20)
+        patch.setattr(replay_baseline, "CALIBRATED_WITH", 40)
+        yield
+
+
+@pytest.fixture(scope="module")
+def small_pictures() -> Iterator[None]:
+    """Draw pictures of few pixels, and do not lay them out, which takes longer than drawing them.
+
+    For tests that ask for files and names: those of the room report have pictures as a user does.
+    """
+    from mapfilter.report import saving
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(saving, "_laid_out", _not_laid_out)
+        patch.setattr(saving, "DPI", 20)
+        yield
+
+
+@contextmanager
+def _not_laid_out(figure: Any) -> Iterator[None]:
+    engine = figure.get_layout_engine()
+    figure.set_layout_engine(None)
+    try:
+        yield
+    finally:
+        figure.set_layout_engine(engine)
 
 
 @pytest.fixture(scope="session")

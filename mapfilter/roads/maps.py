@@ -25,6 +25,9 @@ EMBEDDED_MAPS: Mapping[str, str] = {"helsinki": "helsinki_pbf"}
 OSM_ATTRIBUTION = "© OpenStreetMap contributors (ODbL)"
 """What the licence of these maps asks for where something made from them is shown."""
 
+Wanted = tuple[tuple[str, tuple[str, ...]], ...]
+"""Keys of elements with their values, as :class:`Query` has them."""
+
 SUFFIXES = (".osm.pbf", ".pbf", ".osm", ".osm.gz")
 # Commands that follow each other in one process read the same parts of the same small map.
 _MOST_KEPT = 8
@@ -121,13 +124,28 @@ def read_elements(
         expected = f"an area that {crs} can show, with {pad_m / 1000:g} km around it"
         got = ", ".join(f"{side:.0f}" for side in bounds_m)
         raise fail(InputError, f"{path}, area", expected, got, "a CRS of another region")
-    found = _read(path, _rounded_out(wide), query)
+    version, box = Version.of(path), _rounded_out(wide)
+    if not version.is_small:
+        return _tidy(_read_anew(path, version, box, query), crs, query.tags)
+    wanted = tuple(query.wanted.items())
+    return _tidy_kept(path, version, box, wanted, query.tags, crs).copy()
+
+
+@lru_cache(_MOST_KEPT)
+def _tidy_kept(
+    path: Path, version: Version, box: BoxDeg, wanted: Wanted, tags: tuple[str, ...], crs: str
+) -> GeoDataFrame:
+    return _tidy(_read_kept(path, version, box, wanted, tags), crs, tags)
+
+
+def _tidy(found: GeoDataFrame | None, crs: str, tags: tuple[str, ...]) -> GeoDataFrame:
+    """Return elements as :func:`read_elements` does; what was read stays as it is."""
     if found is None:
         found = GeoDataFrame({"id": np.empty(0, np.int64), "osm_type": []}, geometry=[], crs=crs)
     found = found[~found.geometry.isna() & ~found.geometry.is_empty]
     found = found.sort_values(["id", "osm_type"], ignore_index=True).to_crs(crs)
     found = found[on_earth(found.geometry.to_numpy())].reset_index(drop=True)
-    for tag in query.tags:
+    for tag in tags:
         found[tag] = found[tag].fillna("").astype(str) if tag in found else ""
     return found
 
@@ -185,7 +203,7 @@ def _read_kept(
     path: Path,
     version: Version,
     box: BoxDeg | None,
-    wanted: tuple[tuple[str, tuple[str, ...]], ...],
+    wanted: Wanted,
     tags: tuple[str, ...],
 ) -> GeoDataFrame | None:
     return _read_anew(path, version, box, Query(dict(wanted), tags))

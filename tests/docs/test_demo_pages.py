@@ -27,7 +27,7 @@ PAGES = {
 
 
 @pytest.fixture(scope="module")
-def demo(tmp_path_factory):
+def demo(tmp_path_factory, few_single_reports):  # noqa: ARG001
     """Return the folder in which the demo was run, and its figures."""
     folder = tmp_path_factory.mktemp("demo")
     return folder, run_demo(folder / "out" / "demo", ["output.pictures=none"])

@@ -42,6 +42,7 @@ def named(text: str) -> set[str]:
     return set(re.findall(r"``([^`]+)``", text))
 
 
+@pytest.mark.usefixtures("few_single_reports")
 @pytest.mark.parametrize("name", PAGES, ids=str)
 def test_examples_of_each_page(name):
     failed, _ = doctest.testfile(
@@ -57,6 +58,7 @@ def test_the_quickstart_has_examples():
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("few_single_reports")
 def test_quickstart_commands_run(tmp_path, monkeypatch):
     """All but the demo, which is these same steps, one after another in an empty folder."""
     text = page("quickstart.rst")

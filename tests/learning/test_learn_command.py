@@ -27,6 +27,7 @@ from mapfilter.workflows import learn_study
 from mapfilter.workflows.check_suspects import run_check_suspects
 from mapfilter.workflows.learn import run_learn
 
+pytestmark = pytest.mark.usefixtures("small_pictures")
 JOURNEYS, FEW_JOURNEYS = 5, 3
 FEW = ["filter.bayes.max_particles=3000", "filter.bayes.min_search_particles=3000"]
 

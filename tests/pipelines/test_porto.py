@@ -28,6 +28,7 @@ def porto(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> list[s
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("few_single_reports")
 def test_porto_has_the_points_and_the_success_of_the_paper(
     porto: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -14,6 +14,7 @@ SMALL = ["--set", "area.bbox=24.938,60.164,24.950,60.170"]
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("small_pictures")
 def test_build_and_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = ["--out", str(tmp_path)]
     run_script("build_database", capsys, *SMALL, *out)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from cross_world import make_database, walk_log
+from cross_world import WALK, make_database, walk_log
 
 import mapfilter as mf
 from mapfilter.positioning.bayes.alternative import AlternativeRules
@@ -21,8 +21,8 @@ def database(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def lte(database):
-    """The walk with timing advances of LTE, true ones of the serving cell."""
-    walk = walk_log()
+    """Half of the walk, with timing advances of LTE, true ones of the serving cell."""
+    walk = walk_log(WALK[:2])
     radio, at = walk.radio.copy(), walk.truth.drop_duplicates("time_s").set_index("time_s")
     steps = []
     for row in radio.itertuples():

@@ -65,7 +65,8 @@ def mirrored(heading):
 
 def followed(positioner, log, seed):
     """Follow a log from its known start: errors, whether claimed, reasons, and all states."""
-    rng, truth, state = np.random.default_rng(seed), log.truth, None
+    rng = np.random.default_rng(seed)
+    truth = {name: log.truth[name].to_numpy() for name in ("time_s", "east_m", "north_m")}
     state = positioner.begin_at(truth["east_m"][0], truth["north_m"][0], 5.0, rng)
     off_m, claimed, reasons, states = [], [], [], []
     for epoch in epochs(log):

@@ -141,10 +141,11 @@ def followed(log):
         before = state.belief
         state, output = AREA.step(state, epoch, rng)
         beliefs += state.belief is not before
-        truth_m = [np.interp(epoch.time_s, TRUTH["time_s"], TRUTH[axis]) for axis in PLACE]
-        error_m = np.hypot(output.fix.east_m - truth_m[0], output.fix.north_m - truth_m[1])
-        found.append((error_m, output.fix.radii_m[2]))
-    return *np.array(found).T, beliefs
+        fix = output.fix
+        found.append((epoch.time_s, fix.east_m, fix.north_m, fix.radii_m[2]))
+    time_s, *place_m, radius_m = np.array(found).T
+    truth_m = [np.interp(time_s, TRUTH["time_s"], TRUTH[axis]) for axis in PLACE]
+    return np.hypot(*np.subtract(place_m, truth_m)), radius_m, beliefs
 
 
 def test_a_walk_at_50_hz_is_followed_as_at_its_own_rate():

@@ -109,6 +109,7 @@ def test_threads_read_layers_of_one_part_as_one_thread_does(path, opened):
     for _ in range(5):
         osm_pbf._kept.cache_clear()
         maps._read_kept.cache_clear()
+        maps._tidy_kept.cache_clear()
         read_before = len(opened)
         with ThreadPoolExecutor(4) as pool:
             found = list(pool.map(lambda _: layers(path), range(8)))

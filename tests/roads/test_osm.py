@@ -250,6 +250,16 @@ def test_a_map_is_read_again_when_it_was_written_anew(make_map):
     assert read_ways(made, "walking", *AREA).way_id.tolist() == [6]
 
 
+def test_what_is_changed_of_a_small_map_stays_with_who_changed_it(make_map):
+    made = make_map([(5, {"highway": "residential"}, [(10, 10), (60, 10)])])
+    query = elements.Query({"highway": ()}, ("highway", "name"))
+    found = maps.read_elements(made, *AREA, query)
+    found.loc[0, "highway"] = "changed"
+    found["name"] = "changed"
+    again = maps.read_elements(made, *AREA, query)
+    assert (again["highway"][0], again["name"][0]) == ("residential", "")
+
+
 def test_a_small_map_is_read_once_for_each_part(make_map, monkeypatch):
     made = make_map([(5, {"highway": "residential"}, [(10, 10), (60, 10)])])
     read, read_anew = [], maps._read_anew

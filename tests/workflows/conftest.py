@@ -9,13 +9,19 @@ import pytest
 from command_line import ONE, assert_done, mapfilter, settings
 
 from mapfilter.tracks.store import read_log, write_log
-from mapfilter.workflows import replay_baseline
 
 PLAN = """cell,site,lat,lon,height_m,azimuth_deg,eirp_dbm,frequency_mhz,arfcn,bsic
 A,S1,60.16690,24.94300,30,60,50,1825.2,612,17
 B,S1,60.16690,24.94300,30,180,50,1826.4,618,17
 C,S2,60.16890,24.94880,25,240,50,1827.6,624,17
 """
+
+LOOKED_AT = {
+    "test_build_pictures", "test_cli_locate", "test_cli_reproduce", "test_cli_survey",
+    "test_cli_sweep", "test_drawn_beside", "test_evaluate_pictures", "test_evaluate_recorded",
+    "test_film_command", "test_sweep_titles",
+}  # fmt: skip
+"""Tests of pictures; others ask whether there are files, and of which names."""
 
 IDENTITIES = {"A": (3021, 117001), "B": (3021, 117002), "C": (3022, 117003)}
 """LAC and CI of the cells in the plan with identities."""
@@ -100,15 +106,16 @@ def make_world(folder: Path) -> World:
 
 @pytest.fixture(scope="module", autouse=True)
 def _small_baselines(request):
-    """Locate few single reports beside each replay: they take longer than the replay itself.
+    """Locate few single reports beside each replay; tests of this baseline as many as a user."""
+    if request.path.stem != "test_replay_baseline":
+        request.getfixturevalue("few_single_reports")
 
-    Tests of this baseline locate as many as a user does.
-    """
-    with pytest.MonkeyPatch.context() as patch:
-        if request.path.stem != "test_replay_baseline":
-            patch.setattr(replay_baseline, "MOST_REPORTS", 20)
-            patch.setattr(replay_baseline, "CALIBRATED_WITH", 40)
-        yield
+
+@pytest.fixture(scope="module", autouse=True)
+def _small_pictures(request):
+    """Draw small pictures where they are not looked at: large ones take longer than commands."""
+    if request.path.stem not in LOOKED_AT:
+        request.getfixturevalue("small_pictures")
 
 
 @pytest.fixture(scope="session")
