@@ -139,7 +139,9 @@ def _open(path: Path, verify: str, generation: str | None) -> RadioRouteDatabase
             hint = f"a write that was cut short; the older database is {aside}, rename it"
         raise fail(StoreError, str(path), "a database folder", found, hint)
     if not (path / MANIFEST).is_file():
-        raise fail(StoreError, str(path), MANIFEST, "no such file", "not a database folder")
+        inner = sorted(path.glob(f"*/{MANIFEST}"))[:1]
+        hint = f"the database is {inner[0].parent}" if inner else "not a database folder"
+        raise fail(StoreError, str(path), MANIFEST, "no such file", hint)
     manifest, found = read_manifest(path)
     if generation not in (None, found):
         hint = "it was replaced while in use; start again"

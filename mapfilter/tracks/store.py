@@ -267,7 +267,14 @@ def _no_log(path: Path, expected: str) -> MapfilterError:
             hint = f"convert it first: mapfilter convert {path.name} --out LOG"
         return fail(InputError, str(path), expected, "a file", hint)
     if path.is_dir():
-        return fail(InputError, str(path), expected, "a folder without any")
+        hint = (
+            "a radio-route database, which --db names"
+            if (path / "points.parquet").is_file()
+            else ""
+        )
+        if inner := sorted(path.glob(f"*/*/{HEAD}"))[:1]:
+            hint = f"the logs are in {inner[0].parent.parent}"
+        return fail(InputError, str(path), expected, "a folder without any", hint)
     return fail(InputError, str(path), expected, "nothing", "a mistyped path")
 
 

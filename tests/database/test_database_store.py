@@ -73,6 +73,10 @@ def test_a_missing_database(tmp_path):
         open_database(tmp_path / "none")
     with pytest.raises(StoreError, match="not a database folder"):
         open_database(tmp_path)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "manifest.json").touch()
+    with pytest.raises(StoreError, match=rf"the database is {tmp_path / 'out'}\)"):
+        open_database(tmp_path)
     (tmp_path / "file").touch()
     with pytest.raises(StoreError, match="a file"):
         open_database(tmp_path / "file")

@@ -103,3 +103,46 @@ def test_times_with_all_their_digits_are_read(tmp_path, form):
     rows = pd.DataFrame({"time": texts, "latitude": 60 + 1e-6 * np.arange(300), "longitude": 25.0})
     rows.to_csv(tmp_path / "walk.csv", index=False)
     assert mf.read_log(tmp_path / "walk.csv").duration_s == 299.0
+
+
+@pytest.mark.parametrize("turning", ["yaw_rate_degps", "gyro_z", "acc_x"])
+def test_counts_of_milliseconds_are_refused_as_seconds_of_sensors(tmp_path, turning):
+    """A sensor whose rows came every 100 s would measure no turn and no step."""
+    rows = pd.DataFrame(
+        {
+            "time": np.arange(0, 30_000, 100),
+            "wheel_speed_kmh": 30.0 + np.sin(np.arange(300)),
+            turning: np.cos(np.arange(300)),
+        }
+    )
+    rows.to_csv(tmp_path / "drive.csv", index=False)
+    with pytest.raises(InputError, match="time_ms for milliseconds") as refused:
+        mf.read_log(tmp_path / "drive.csv")
+    (fault,) = refused.value.faults
+    assert fault.where == f"{tmp_path / 'drive.csv'}, time (time)"
+    assert fault.got == "whole numbers, 100 from row to row"
+
+
+@pytest.mark.parametrize(
+    ("header", "each", "turning"),
+    [
+        ("time_s", 100, "yaw_rate_degps"),
+        ("seconds", 100, "yaw_rate_degps"),
+        ("time", 9, "yaw_rate_degps"),
+        ("time", 100.5, "yaw_rate_degps"),
+        ("time", 100, "engine"),
+        ("time_ms", 100, "yaw_rate_degps"),
+    ],
+)
+def test_slow_rows_are_read_as_they_are(tmp_path, header, each, turning):
+    rows = pd.DataFrame(
+        {
+            header: each * np.arange(300),
+            "wheel_speed_kmh": 30.0 + np.sin(np.arange(300)),
+            turning: np.cos(np.arange(300)),
+        }
+    )
+    rows.to_csv(tmp_path / "drive.csv", index=False)
+    columns = {"time": header} if header == "seconds" else {}
+    log = mf.read_log(tmp_path / "drive.csv", columns=columns)
+    assert log.duration_s == pytest.approx(299 * each * (0.001 if header == "time_ms" else 1))

@@ -143,6 +143,12 @@ def test_journeys_of_a_path(made, tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="a folder without any"):
         list_journeys(tmp_path / "empty")
+    write_log(log, tmp_path / "out" / "journeys" / "a")
+    with pytest.raises(InputError, match=rf"the logs are in {tmp_path / 'out' / 'journeys'}\)"):
+        list_journeys(tmp_path / "out")
+    (tmp_path / "empty" / "points.parquet").touch()
+    with pytest.raises(InputError, match="a radio-route database, which --db names"):
+        list_journeys(tmp_path / "empty")
     hand = tmp_path / "hand"
     hand.mkdir()
     (hand / "motion.csv").write_text("time_s,step_m\n0,1\n")

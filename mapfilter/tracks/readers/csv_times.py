@@ -52,6 +52,9 @@ _OF_DAY = "time: taken for hours, minutes and seconds of the day in one number, 
 _LONG, _SHORT, _JUMP, _FEWEST_JUMPS = 300.0, 20.0, 40.0, 3
 """Of times, their steps and the jumps between their minutes, to tell them from seconds."""
 _DAYS = "time: days since 1900, as a spreadsheet writes them"
+_OF_SENSORS = ("yaw_rate_radps", "yaw_rate_degps", "gyr_z", "acc_x")
+_SELDOM_S, _FEWEST_SELDOM = 10.0, 20
+"""Seconds between rows in which no sensor follows turns or steps, and the fewest such rows."""
 
 
 def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
@@ -81,6 +84,7 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
             counted_s = utc_from_week_s(weeks_of(mapped.rows, week, reading), number)
             return over_stuck_weeks(reading, counted_s, week)
         number = _without_digits(reading, number)
+        _check_milliseconds(mapped, reading, number[np.isfinite(number)])
         reading.clock = Clock("monotonic", from_midnight=_OF_DAY in reading.notes)
         return over_days(reading, over_weeks(reading, number))
     reading.notes[:] = [
@@ -165,6 +169,27 @@ def _without_digits(reading: Reading, number: Floats) -> Floats:
     counted = number.copy()
     counted[known] = 3600 * hours + 60 * minutes + seconds
     return counted
+
+
+def _check_milliseconds(mapped: Mapped, reading: Reading, known: Floats) -> None:
+    """Refuse whole numbers without a unit by which turns or accelerations came very seldom.
+
+    Raises
+    ------
+    InputError
+        Naming the column of times.
+    """
+    column = mapped.rows.find(*mapped.names("time")) or ""
+    if mapped.unit("time") is not None or "sec" in column or known.size < _FEWEST_SELDOM:
+        return
+    between_s = float(np.median(np.diff(np.unique(known)))) if np.ptp(known) else 0.0
+    if between_s < _SELDOM_S or (known != np.round(known)).any():
+        return
+    if any(map(mapped.holds, _OF_SENSORS)):
+        got = f"whole numbers, {between_s:g} from row to row"
+        hint = "milliseconds for s; call the column time_ms for milliseconds, time_s for seconds"
+        expected = "seconds, and rows of a sensor that follow each other"
+        raise fail(InputError, f"{reading.path}, time ({column})", expected, got, hint)
 
 
 def _check_digits(mapped: Mapped, reading: Reading, known: Floats) -> None:
