@@ -19,7 +19,7 @@ from mapfilter._types import Floats32
 from mapfilter.check.findings import Findings
 from mapfilter.check.lobes import Lobe, azimuth_mistakes, find_lobe
 from mapfilter.check.place_fits import fits_with_antenna, in_squares, place_fits, places_to_try
-from mapfilter.check.raster_checks import above_free_space_db, falls_with_distance
+from mapfilter.check.raster_kinds import above_free_space_db, falls_with_distance
 from mapfilter.check.samples import RasterSample, thinned
 from mapfilter.errors import listed
 from mapfilter.radio.cells import Cell, CellPlan

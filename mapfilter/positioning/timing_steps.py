@@ -55,7 +55,20 @@ def with_one_step(log: TrackLog, options: Any) -> TrackLog:
 
     Those of GSM or LTE stay, whichever are more; those of NR, whose steps depend on the numerology,
     and those without a technology beside others go. All stay where the log states no technology, or
-    options set the length of a step.
+    options set the length of a step. It is 553.5 m in GSM and 78.1 m in LTE
+    (:data:`mapfilter.radio.identities.TIMING_STEP_M`).
+
+    Parameters
+    ----------
+    log : TrackLog
+        Its ``radio`` has ``timing_advance``, in steps of the ``technology`` of each row.
+    options
+        Of a filter; those without ``timing_step_m`` read no steps.
+
+    Returns
+    -------
+    TrackLog
+        The log itself where all stay.
 
     Examples
     --------

@@ -7,8 +7,8 @@ located from the levels.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -17,18 +17,15 @@ from threadpoolctl import ThreadpoolController
 
 from mapfilter._types import Floats
 from mapfilter._words import number_of
-from mapfilter.errors import InputError, fail, listed
 from mapfilter.radio.cells import CellPlan
-from mapfilter.survey.expected_offsets import ExpectedOffset, expected_offsets, measured_offset
-from mapfilter.survey.level_trend import (
-    OFFSET_DEVIATION_DB,
-    Covariate,
-    DistanceLoss,
-    Prior,
-    Trend,
-    fit_trend,
-    locate_antenna,
+from mapfilter.survey.cell_trends import (
+    TrendRules,
+    offsets_of_prediction,
+    often_enough,
+    predicted_alone,
 )
+from mapfilter.survey.expected_offsets import ExpectedOffset
+from mapfilter.survey.level_trend import Covariate, DistanceLoss, Trend
 from mapfilter.survey.measured_points import Points, points_by_cell
 from mapfilter.survey.measurements import Measurements
 from mapfilter.survey.options import SurveyOptions
@@ -47,8 +44,6 @@ if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
 _ROUNDS = 2
-_NAMED = 3
-_LOCATED_FROM = 300
 
 
 @cache
@@ -170,129 +165,70 @@ def fit_survey(
     Raises
     ------
     InputError
-        No cell was received often enough.
+        No cell was received often enough, or none was predicted.
     """
     found = points_by_cell(measurements, options.square_m, options.most_points)
-    notes = []
+    strange: tuple[str, ...] = ()
     if predicted is not None:
-        strange = [cell_id for cell_id in found if cell_id not in predicted]
-        example = next(iter(predicted), "none")
-        if strange and len(strange) == len(found):
-            expected = f"cells of the prediction, such as {example}"
-            got = f"none in {number_of(len(found), 'cell')}, such as {strange[0]}"
-            raise fail(InputError, "measurements", expected, got, _renamed(strange, predicted))
-        if strange:
-            notes.append(
-                f"{number_of(len(strange), 'cell')} left out: not in the prediction, which has "
-                f"such as {example}: {listed(strange, _NAMED)} (likely: "
-                f"{_renamed(strange, predicted)})"
-            )
-        found = {
-            cell_id: some.some(np.isfinite(predicted[cell_id](some.east_m, some.north_m)))
-            for cell_id, some in found.items()
-            if cell_id in predicted
-        }
-    from scipy.spatial import cKDTree
-
-    points = [some for some in found.values() if len(some) >= options.min_points]
-    if len(points) < len(found):
-        few = len(found) - len(points)
-        left = "left out" if predicted is None else "without a calibration of its own"
-        cause = f"received in fewer than {options.min_points} squares"
-        notes.append(f"{number_of(few, 'cell')} {left}: {cause}")
-    if not points:
-        expected = f"a cell received in at least {options.min_points} squares"
-        raise fail(
-            InputError,
-            "measurements",
-            expected,
-            f"{number_of(len(found), 'cell')}, none of them",
-        )
+        found, strange = predicted_alone(found, predicted)
+    points, few = often_enough(found, options.min_points, calibrated=predicted is not None)
     level_dbm = float(np.mean([some.level_dbm.mean() for some in points]))
     plan = plan.to_crs(measurements.crs) if plan is not None else None
-    shadowing = Shadowing()
-    offsets: dict[str, ExpectedOffset] = {}
-    unknown_offset = ExpectedOffset(0.0, OFFSET_DEVIATION_DB)
-
-    def trend_of(points: Points) -> Trend:
-        prior = Prior(level_dbm)
-        covariate: Covariate | None = None
-        if predicted is not None:
-            offset = offsets.get(points.cell_id, unknown_offset)
-            prior = Prior.of_prediction(offset.offset_db, offset.deviation_db)
-            covariate = predicted[points.cell_id]
-        elif options.trend == "path_loss" and plan is not None and points.cell_id in plan:
-            covariate = DistanceLoss.of_cell(plan[points.cell_id])
-        elif options.trend == "path_loss" and len(points) >= options.min_points_to_locate:
-            some = points.thinned(_LOCATED_FROM)
-            covariate = locate_antenna(some, shadowing.covariance_db2(some), prior)
-        return fit_trend(covariate, points, shadowing.covariance_db2(points), prior)
-
-    cells = {}
+    rules, shadowing = TrendRules(options, level_dbm, plan, predicted), Shadowing()
+    wanted = [some for some in points if only is None or some.cell_id in only]
     # Threads make small matrices slower, and their sums depend on how many there are.
     with thread_pools().limit(limits=1):
         telling = most_telling(points)
         for _ in range(_ROUNDS):
-            shadowing = learn_shadowing(telling, [trend_of(some) for some in telling], shadowing)
+            trends = [rules.trend(some, shadowing) for some in telling]
+            shadowing = learn_shadowing(telling, trends, shadowing)
         if predicted is not None:
-            offsets = _expected(points, predicted, plan, shadowing)
-        for some in points:
-            if only is not None and some.cell_id not in only:
-                continue
-            trend = trend_of(some)
-            antenna = trend.covariate if isinstance(trend.covariate, DistanceLoss) else None
-            made: ResidualField = TrendField(trend, shadowing)
-            if options.method == "gp":
-                made = GaussianField(some, trend, shadowing)
-            elif options.method == "knn":
-                made = NeighbourField(some, trend, shadowing, options.neighbours)
-            cells[some.cell_id] = SurveyedCell(
-                some,
-                trend,
-                made,
-                (antenna.east_m, antenna.north_m) if antenna is not None else None,
-                antenna is not None and not (plan is not None and some.cell_id in plan),
-                cKDTree(some.measured_at),
-            )
-    located = sum(cell.estimated for cell in cells.values())
-    if located:
+            offsets = offsets_of_prediction(points, predicted, plan, shadowing)
+            rules = replace(rules, offsets=offsets)
+        cells = {some.cell_id: _surveyed(some, rules, shadowing) for some in wanted}
+    known = {some.cell_id for some in points}
+    return Survey(
+        measurements.crs,
+        options,
+        shadowing,
+        cells,
+        {one: offset for one, offset in rules.offsets.items() if one not in known},
+        weakest_reported(measurements),
+        measurements.technologies,
+        (*strange, *few, *_antenna_notes(cells.values(), rules)),
+    )
+
+
+def _surveyed(points: Points, rules: TrendRules, shadowing: Shadowing) -> SurveyedCell:
+    # Here, as it takes long to import, and the types above are of use without it.
+    from scipy.spatial import cKDTree
+
+    trend, options, plan = rules.trend(points, shadowing), rules.options, rules.plan
+    antenna = trend.covariate if isinstance(trend.covariate, DistanceLoss) else None
+    made: ResidualField = TrendField(trend, shadowing)
+    if options.method == "gp":
+        made = GaussianField(points, trend, shadowing)
+    elif options.method == "knn":
+        made = NeighbourField(points, trend, shadowing, options.neighbours)
+    return SurveyedCell(
+        points,
+        trend,
+        made,
+        (antenna.east_m, antenna.north_m) if antenna is not None else None,
+        antenna is not None and not (plan is not None and points.cell_id in plan),
+        cKDTree(points.measured_at),
+    )
+
+
+def _antenna_notes(cells: Collection[SurveyedCell], rules: TrendRules) -> list[str]:
+    """Return notes on antennas that were located from their levels, and that could not be."""
+    notes, options = [], rules.options
+    if located := sum(cell.estimated for cell in cells):
         notes.append(f"{number_of(located, 'antenna')} located from their levels")
-    unknown = sum(cell.antenna is None for cell in cells.values())
-    if unknown and predicted is None and options.trend == "path_loss":
+    unknown = sum(cell.antenna is None for cell in cells)
+    if unknown and rules.predicted is None and options.trend == "path_loss":
         notes.append(
             f"{number_of(unknown, 'antenna')} not located (fewer than "
             f"{options.min_points_to_locate} squares): the trend is their mean level"
         )
-    weakest, kinds = weakest_reported(measurements), measurements.technologies
-    known = {some.cell_id for some in points}
-    unmeasured = {one: offset for one, offset in offsets.items() if one not in known}
-    return Survey(
-        measurements.crs, options, shadowing, cells, unmeasured, weakest, kinds, tuple(notes)
-    )
-
-
-def _expected(
-    points: Sequence[Points],
-    predicted: Mapping[str, Covariate],
-    plan: CellPlan | None,
-    shadowing: Shadowing,
-) -> dict[str, ExpectedOffset]:
-    """Return the offset that other cells let expect: of cells with points, and of the plan's."""
-    sites = {cell.id: cell.site for cell in plan.cells} if plan is not None else {}
-    measured = []
-    for some in (one.thinned(_LOCATED_FROM) for one in points):
-        error_db = some.level_dbm - predicted[some.cell_id](some.east_m, some.north_m)
-        site = sites.get(some.cell_id, some.cell_id)
-        measured.append(measured_offset(site, error_db, shadowing.covariance_db2(some)))
-    ids = dict.fromkeys(some.cell_id for some in points)
-    others = [one for one in predicted if one in sites and one not in ids]
-    expected = expected_offsets(measured, [sites[one] for one in others])
-    return dict(zip([*ids, *others], expected, strict=True))
-
-
-def _renamed(strange: Collection[str], predicted: Collection[str]) -> str:
-    """Return why cells are likely not among those of a prediction."""
-    forms = {cell_id.casefold() for cell_id in predicted}
-    if any(cell_id.casefold() in forms for cell_id in strange):
-        return "names that differ in upper and lower case only"
-    return "other names or identities, or another network"
+    return notes

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._words import number_of
-from mapfilter.errors import InputError, fail
+from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.geodesy import heading_from_azimuth_rad
 from mapfilter.tracks.alignment import Alignment, align
 from mapfilter.tracks.beyond_crs import within_crs
@@ -56,14 +56,7 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         of their degrees, or the tables make no sense.
     """
     options = options or CombineOptions()
-    journey = [r for r in recordings if set(r.tables) - _NO_JOURNEY]
-    if not journey:
-        names = ", ".join(r.path.name for r in recordings)
-        expected = "a recording of a journey"
-        orbits = any("ephemerides" in r.tables for r in recordings)
-        got = "only orbits of satellites" if orbits else "only a list of cells"
-        hint = "name them together with a recording of pseudoranges" if orbits else _CELLS_HINT
-        raise fail(InputError, names, expected, got, hint)
+    journey = _journey(recordings)
     check_far_apart(journey)
     alignment = align(journey, options.offsets_s)
     shifted = [
@@ -73,15 +66,7 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
     frame = Frame(shifted, options.crs, options.origin_deg, options.about_deg)
     shifted, beyond = within_crs(shifted, frame.crs, frame.local)
     notes = [*alignment.notes, *frame.notes, *beyond]
-    for one in shifted:
-        if (rows := one.tables.get("positions")) is not None and "speed_mps" in rows:
-            notes += check_speeds(one, *frame.east_north(rows, one.crs))
-    for recording in recordings:
-        if "cells" in recording.tables:
-            count = len(recording.tables["cells"])
-            notes.append(
-                f"{recording.path.name}: a list of {number_of(count, 'cell')}; {_CELLS_HINT}"
-            )
+    notes += [*_speed_notes(shifted, frame), *_list_notes(recordings)]
     true_alone = set(options.truth) - set(options.measured)
     measured = [r for r in shifted if r.path not in true_alone]
     sensors = _sensors(measured, frame, options.truth, notes)
@@ -98,9 +83,8 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
     names = ", ".join(r.path.name for r in measured)
     rows, given_factors = scaled_motion(moved.rows, options.factors, names)
     moved = replace(moved, rows=rows)
-    notes += given_factors
     mirrored = mirrored_notes(shifted, moved)
-    notes += mirrored
+    notes += [*given_factors, *mirrored]
     by_receiver = moved.source == OF_RECEIVER
     others = [one for one in shifted if one.path not in options.truth]
     truth = _truth(shifted, frame, options)
@@ -114,15 +98,8 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         "truth": truth,
         "pseudoranges": _satellites(recordings, shifted, notes),
     }
-    start_s = min(
-        float(rows["time_s"].min()) for r in shifted for rows in r.tables.values() if len(rows)
-    )
-    start_s = float(np.floor(start_s))
-    given = {
-        name: rows.assign(time_s=rows["time_s"] - start_s)
-        for name, rows in tables.items()
-        if rows is not None and len(rows)
-    }
+    start_s = float(np.floor(min(_first_times(shifted))))
+    given = _since(start_s, tables)
     if "radio" in given:
         given["radio"] = _radio(given["radio"])
     if moved.reckoning is not None:
@@ -142,18 +119,72 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         faults = (replace(one, where=f"{names}, {one.where}") for one in error.faults)
         raise InputError(tuple(faults)) from error
     if mirrored:
-        # The other half of the same fault: either positions or azimuths are mirrored.
-        halves = ["motion, turn_rad: turns run"]
-        halves += ["motion, heading_rad: headings run"] if moved.compass else []
-        kept = (note for note in log.notes if not note.startswith(tuple(halves)))
-        log = replace(log, notes=tuple(kept))
+        log = _without_mirrored_turns(log, compass=moved.compass)
     if not given and not sensors:
-        names = ", ".join(r.path.name for r in recordings)
-        odometry = [r.tables["odometry"] for r in shifted if "odometry" in r.tables]
-        turns = any(rows["yaw_rate_radps"].notna().any() for rows in odometry)
-        got = "yaw rates without speeds or an odometer" if turns else "none"
-        raise fail(InputError, names, "rows of a journey", got)
+        raise _nothing_found(recordings, shifted)
     return Combined(log, sensors, alignment, tuple(notes))
+
+
+def _journey(recordings: Sequence[Recording]) -> list[Recording]:
+    """Return the recordings with more than lists of cells and orbits; InputError without any."""
+    journey = [r for r in recordings if set(r.tables) - _NO_JOURNEY]
+    if journey:
+        return journey
+    names = ", ".join(r.path.name for r in recordings)
+    orbits = any("ephemerides" in r.tables for r in recordings)
+    got = "only orbits of satellites" if orbits else "only a list of cells"
+    hint = "name them together with a recording of pseudoranges" if orbits else _CELLS_HINT
+    raise fail(InputError, names, "a recording of a journey", got, hint)
+
+
+def _speed_notes(recordings: Sequence[Recording], frame: Frame) -> list[str]:
+    """Return notes on speeds of receivers that their positions contradict."""
+    notes: list[str] = []
+    for one in recordings:
+        rows = one.tables.get("positions")
+        if rows is not None and "speed_mps" in rows:
+            notes += check_speeds(one, *frame.east_north(rows, one.crs))
+    return notes
+
+
+def _list_notes(recordings: Sequence[Recording]) -> list[str]:
+    """Return notes on lists of cells, which are no part of a journey."""
+    lists = [(r.path.name, len(r.tables["cells"])) for r in recordings if "cells" in r.tables]
+    return [f"{name}: a list of {number_of(n, 'cell')}; {_CELLS_HINT}" for name, n in lists]
+
+
+def _first_times(recordings: Sequence[Recording]) -> list[float]:
+    """Return the first time of each table with rows."""
+    tables = (rows for r in recordings for rows in r.tables.values() if len(rows))
+    return [float(rows["time_s"].min()) for rows in tables]
+
+
+def _since(start_s: float, tables: Mapping[str, pd.DataFrame | None]) -> dict[str, pd.DataFrame]:
+    """Return the tables with rows, their times counted from a start."""
+    return {
+        name: rows.assign(time_s=rows["time_s"] - start_s)
+        for name, rows in tables.items()
+        if rows is not None and len(rows)
+    }
+
+
+def _without_mirrored_turns(log: TrackLog, *, compass: bool) -> TrackLog:
+    """Return a log without notes on turns, or headings of a compass, that run the other way.
+
+    They are the other half of the same fault: either positions or azimuths are mirrored.
+    """
+    halves = ["motion, turn_rad: turns run"]
+    halves += ["motion, heading_rad: headings run"] if compass else []
+    kept = (note for note in log.notes if not note.startswith(tuple(halves)))
+    return replace(log, notes=tuple(kept))
+
+
+def _nothing_found(recordings: Sequence[Recording], journey: Sequence[Recording]) -> MapfilterError:
+    names = ", ".join(r.path.name for r in recordings)
+    odometry = [r.tables["odometry"] for r in journey if "odometry" in r.tables]
+    turns = any(rows["yaw_rate_radps"].notna().any() for rows in odometry)
+    got = "yaw rates without speeds or an odometer" if turns else "none"
+    return fail(InputError, names, "rows of a journey", got)
 
 
 def _joined(recordings: Sequence[Recording], table: str) -> pd.DataFrame | None:

@@ -21,12 +21,7 @@ from mapfilter.check.findings import CheckResult, Findings, Severity
 from mapfilter.check.identity_checks import check_identities
 from mapfilter.check.index_order import plan_by_index
 from mapfilter.check.level_law import check_factor
-from mapfilter.check.raster_checks import (
-    check_ids,
-    is_surveyed,
-    sampled,
-    strongest,
-)
+from mapfilter.check.raster_checks import check_ids, is_surveyed, sampled, strongest
 from mapfilter.check.site_checks import check_against_sites, check_power
 from mapfilter.config.sections import Config
 from mapfilter.database.floor import floor_of

@@ -25,8 +25,8 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.bayes.alternative import NullHypothesis
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.certainty import Recovery
+from mapfilter.positioning.bayes.doubted import positions_in_doubt
 from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm, RadioReading
-from mapfilter.positioning.bayes.filter import _in_doubt
 from mapfilter.positioning.bayes.held import HeldOtherwise
 from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.hold_rules import PullRules
@@ -293,12 +293,12 @@ def test_positions_in_doubt_are_told_once_each():
     epoch = Epoch(9.0, (), fix=GnssFix(1.0, 2.0, 9.0, 9.0, 0.0),
                   ranges=(Pseudorange("G01", 2e7, 1.0, (0, 0, 0)),))  # fmt: skip
     why = Reason.REJECTED_BY_EVIDENCE
-    assert _in_doubt(epoch, []) == [
+    assert positions_in_doubt(epoch, []) == [
         UnusedReading(9.0, "gnss", "", why), UnusedReading(9.0, "pseudorange", "G01", why),
     ]  # fmt: skip
     told = [UnusedReading(9.0, "gnss", "", Reason.ON_PROBATION)]
-    assert [one.kind for one in _in_doubt(epoch, told)] == ["pseudorange"]
-    assert _in_doubt(Epoch(9.0), []) == []
+    assert [one.kind for one in positions_in_doubt(epoch, told)] == ["pseudorange"]
+    assert positions_in_doubt(Epoch(9.0), []) == []
 
 
 def test_distrusted_positions_are_rejected_from_then_on():

@@ -9,11 +9,8 @@ from mapfilter.check.lobes import (
     find_lobe,
 )
 from mapfilter.check.place_fits import peak_m
-from mapfilter.check.raster_checks import (
-    RasterSample,
-    above_free_space_db,
-    falls_with_distance,
-)
+from mapfilter.check.raster_kinds import above_free_space_db, falls_with_distance
+from mapfilter.check.samples import RasterSample
 from mapfilter.geodesy import heading_from_azimuth_rad
 from mapfilter.lattice import Lattice
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel

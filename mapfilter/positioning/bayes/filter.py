@@ -24,6 +24,7 @@ from mapfilter.positioning.bayes.area_frame import AreaFrame
 from mapfilter.positioning.bayes.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
 from mapfilter.positioning.bayes.claims import judged
+from mapfilter.positioning.bayes.doubted import doubted
 from mapfilter.positioning.bayes.evidence import EvidenceSource, EvidenceUpdate
 from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
@@ -217,22 +218,11 @@ class BayesPositioner(Filter[BayesState]):
                     state = replace(state, belief=belief, status=status)
                 positioned = gnss_of(state).was_used(epoch.time_s)
                 state = judged(self.beliefs, state, weighed=used, positioned=positioned)
-        other_unit = state.hold.step_unit_m != hold.step_unit_m
-        read_anew = state.hold != hold and not other_unit
-        taken_over = read_anew and not state.hold.is_as_measured
-        if motion is Reason.USED and state.contested and self.beliefs.may_have_left(state):
-            unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.MOTION_STUCK))
-        elif state.contested and self.beliefs.is_pulled(state):
-            unused += _in_doubt(epoch, unused)
-        elif motion is Reason.USED and (taken_over or (epoch.motion and state.contested)):
-            unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.PHONE_TURNED))
-        elif other_unit:
-            unused.append(UnusedReading(epoch.time_s, "motion", "", Reason.OTHER_UNIT))
-        gnss = gnss_of(state)
-        if epoch.fix is not None and gnss.was_used(epoch.time_s):
-            state = replace(state, last_fix=epoch.fix)
-        if gnss.was_used(epoch.time_s):
-            state = replace(state, watch=state.watch.positioned(epoch.time_s))
+        unused += doubted(self.beliefs, state, hold, epoch, unused, moves=motion is Reason.USED)
+        if gnss_of(state).was_used(epoch.time_s):
+            last_fix = state.last_fix if epoch.fix is None else epoch.fix
+            watch = state.watch.positioned(epoch.time_s)
+            state = replace(state, last_fix=last_fix, watch=watch)
         if reason not in _TOLD_ELSEWHERE:
             # Of a report without a serving cell, the first one.
             named = (row.cell for row in epoch.radio if row.cell is not None)
@@ -291,12 +281,3 @@ def _tracked(state: BayesState) -> BayesState:
     if not (state.contested or state.status is Status.UNCERTAIN):
         return state
     return replace(state, status=Status.TRACKING, contested=False)
-
-
-def _in_doubt(epoch: Epoch, unused: Sequence[UnusedReading]) -> list[UnusedReading]:
-    """Return the positions of an epoch as rejected, but for those that are unused already."""
-    given = [("gnss", "")] if epoch.fix is not None else []
-    given += [("pseudorange", one.satellite) for one in epoch.ranges]
-    told = {(one.kind, one.what) for one in unused}
-    why = Reason.REJECTED_BY_EVIDENCE
-    return [UnusedReading(epoch.time_s, *one, why) for one in given if one not in told]

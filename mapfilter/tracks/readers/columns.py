@@ -15,12 +15,11 @@ import pyarrow.compute as pc
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.tracks.readers.local_parts import note_changes
-from mapfilter.tracks.readers.local_times import is_beside_change, utc_from_local_s
+from mapfilter.tracks.readers.local_times import is_beside_change
+from mapfilter.tracks.readers.plain_times import plain_times
 from mapfilter.tracks.readers.reading import Reading
 from mapfilter.tracks.readers.times import LEAST_UNIX_S, parse_times, seconds_of_day, unix_seconds
 
-_EARLIEST_S, _LATEST_S = -2_208_988_800.0, 4_102_444_800.0
-"""The years 1900 to 2099."""
 _NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
 _DIGIT = r"\d"
 _WHOLE = r"^(?:[-+]?(\d{1,18}|[0-8]\d{18})|0[xX][0-9a-fA-F]{1,15})$"
@@ -123,10 +122,7 @@ class Columns:
                 pass
             else:
                 return unix_seconds(np.where(np.abs(number) > LEAST_UNIX_S, number, np.nan)), True
-        if (
-            column is not None
-            and (found := _plain_times(column, zone, layout, after_s)) is not None
-        ):
+        if column is not None and (found := plain_times(column, zone, layout, after_s)) is not None:
             return found
         return parse_times(rows.texts(*names), zone, layout, after_s)
 
@@ -280,31 +276,6 @@ class Columns:
             )
         column = pc.replace_substring_regex(column, r"^\+", "")
         return pc.cast(pc.if_else(good, column, None), kind)
-
-
-def _plain_times(
-    column: pa.ChunkedArray, zone: str, layout: str, after_s: float
-) -> tuple[Floats, bool] | None:
-    """Return times that are all of one plain layout, all of them with a zone or none; else None.
-
-    It gives what :func:`parse_times` does, in a tenth of its time.
-    """
-    trimmed = pc.utf8_trim_whitespace(column)
-    for own in ("UTC", None) if layout == "ISO8601" else (None,):
-        try:
-            if layout == "ISO8601":
-                moments = pc.cast(trimmed, pa.timestamp("ns", own))
-            else:
-                moments = pc.strptime(trimmed, format=layout, unit="ns")
-        except pa.ArrowInvalid:
-            continue
-        ns = np.asarray(pc.cast(moments, pa.int64()).to_numpy(), dtype=np.int64)
-        time_s = ns // 10**9 + ns % 10**9 / 1e9
-        time_s[(time_s < _EARLIEST_S) | (time_s >= _LATEST_S)] = np.nan
-        if own is None and zone:
-            time_s = utc_from_local_s(time_s, zone, after_s)
-        return time_s, bool(own or zone)
-    return None
 
 
 def only(columns: Mapping[str, Any], lines: Ints, rows: Bools) -> tuple[dict[str, Any], Ints]:
