@@ -32,6 +32,7 @@ def read(tmp_path, columns, **own):
         ("VehicleSpeed (miles per hour)", 1 / 0.44704),
         ("GPS Speed (Meters/second)", 1.0),
         ("Wheel speed [m/s]", 1.0),
+        ("Vehicle Speed Sensor [km/h]", 3.6),
     ],
 )
 @pytest.mark.parametrize(
@@ -60,13 +61,17 @@ def test_speeds_alone_are_a_vehicles(tmp_path):
     assert "speed: taken for a vehicle's, as there are no positions beside it" in found.notes
 
 
-def test_positions_are_found_by_their_headers(tmp_path):
+@pytest.mark.parametrize(
+    ("accuracy", "by"),
+    [("Horizontal accuracy [m]", 1.0), ("hAcc_m", 1.0), ("hAcc (mm)", 1000.0)],
+)
+def test_positions_are_found_by_their_headers(tmp_path, accuracy, by):
     columns = {
         "Timestamp [ms]": 1000 * TIME_S,
         "Latitude [deg]": PLACES["latitude"],
         "Longitude (°)": PLACES["longitude"],
         "Altitude (ft)": 100 / 0.3048,
-        "Horizontal accuracy [m]": 4.0,
+        accuracy: 4.0 * by,
         "Bearing [deg]": 45.0,
         "Speed (knots)": SPEED_MPS * 3600 / 1852,
     }
