@@ -31,7 +31,6 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
         "position accuracy",
         "gps accuracy",
         "location accuracy",
-        "hacc",
     ),
     "speed_mps": (
         *("speed", "velocity", "gps speed", "gnss speed", "gps velocity", "ground speed"),
