@@ -80,6 +80,25 @@ def test_json_is_named(tmp_path, name, start):
         mf.read_log(tmp_path / name)
 
 
+@pytest.mark.parametrize(
+    ("name", "data", "hint"),
+    [
+        (
+            "ride.tcx",
+            b'<?xml version="1.0"?>\n<TrainingCenterDatabase/>\n',
+            "a TCX file; export GPX",
+        ),
+        ("flight.igc", b"AXXXABC\nHFDTE010526\n", "an IGC file; export GPX"),
+        ("survey.gpkg", b"SQLite format 3\0\x10\0", "a GeoPackage; export its tables as CSV"),
+        ("car.ubx", b"\xb5b\x01\x07\x5c\n\0\0" * 9, "u-blox receiver; export NMEA, or RINEX"),
+    ],
+)
+def test_files_of_formats_that_are_not_read_are_named(tmp_path, name, data, hint):
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(InputError, match=hint):
+        mf.read_log(tmp_path / name)
+
+
 def test_columns_of_another_language_are_named_by_their_units(tmp_path):
     """The columns of positions were proposed, of which the file has none."""
     head = "time;Vitesse (km/h);Vitesse de lacet (deg/s);Niveau [dBm];Remarque"

@@ -39,6 +39,17 @@ def test_elements_in_any_order_with_prefixes_and_attributes(read):
     assert recording.notes == ()
 
 
+def test_accuracies_as_a_watch_states_them(read):
+    body = (
+        "<ele>19.396494</ele><time>2026-05-01T10:00:00Z</time>"
+        "<extensions><speed>1.500479</speed><course>139.218750</course>"
+        "<hAcc>2.281494</hAcc><vAcc>1.575096</vAcc></extensions>"
+    )
+    row = read(one(body)).tables["positions"].iloc[0]
+    assert row["accuracy_m"] == pytest.approx(2.281494)
+    assert row["speed_mps"] == pytest.approx(1.500479)
+
+
 def test_a_prefix_on_every_tag(read):
     plain = read(TEXT).tables["positions"]
     prefixed = TEXT.replace("</", "</g:").replace("<", "<g:")

@@ -32,6 +32,7 @@ def read(tmp_path, columns, **own):
         ("VehicleSpeed (miles per hour)", 1 / 0.44704),
         ("GPS Speed (Meters/second)", 1.0),
         ("Wheel speed [m/s]", 1.0),
+        ("Vehicle Speed Sensor [km/h]", 3.6),
     ],
 )
 @pytest.mark.parametrize(

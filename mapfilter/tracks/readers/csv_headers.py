@@ -39,6 +39,7 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "wheel_speed_mps": (
         *("wheel speed", "vehicle speed", "car speed", "obd speed", "can speed", "odometer speed"),
         *("wheel velocity", "vehicle velocity", "speedometer"),
+        *("vehicle speed sensor", "wheel speed sensor"),
     ),
     "course_deg": (
         *("course", "bearing", "gps course", "gps bearing", "course over ground", "cog"),

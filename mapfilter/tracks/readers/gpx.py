@@ -81,8 +81,8 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
 
 
 def _accuracy(rows: Columns) -> Floats:
-    """Return the accuracy that a phone states, else one by the HDOP."""
-    stated = rows.number("accuracy")
+    """Return the accuracy that a phone or a watch states, else one by the HDOP."""
+    stated = rows.number("accuracy", "hacc")
     return np.where(np.isnan(stated), UERE_M * rows.number("hdop"), stated)
 
 
@@ -142,9 +142,9 @@ def _columns(points: pa.Array, lines: Ints, reading: Reading) -> Columns:
             pattern = _ATTRIBUTE if name in ("lat", "lon") else _ELEMENT
             values = _extracted(some, pattern.replace("NAME", name))
             found[name] = pc.replace_with_mask(found[name], other, values)
-    for name in ("speed", "course", "bearing", "hdop", "accuracy"):
+    for name in ("speed", "course", "bearing", "hdop", "accuracy", "hAcc"):
         if pc.any(pc.match_substring(points, name)).as_py():
-            found[name] = _extracted(points, _ELEMENT.replace("NAME", name))
+            found[name.lower()] = _extracted(points, _ELEMENT.replace("NAME", name))
     rows = Columns(reading, tuple(found), lines, decimal_comma=True)
     rows._columns.update(enumerate(pa.chunked_array([one]) for one in found.values()))
     return rows
