@@ -36,6 +36,10 @@ _NOT_USED = {
         ),
         "an option of replay, as sweeps simulate no such measurement",
     ),
+    **dict.fromkeys(
+        (f"filter.kalman.turn_{name}" for name in ("drift_deg_per_sqrt_m", "rate_sd_deg_per_s")),
+        "an option of replay, as simulated motion has headings",
+    ),
 }
 """Numeric options of these sections that change nothing in a sweep, and what does instead."""
 

@@ -227,3 +227,13 @@ def test_recordings_page_lists_every_format_with_an_example():
     listed = named(page("file-formats.rst"))
     assert {column for columns in SENSOR_COLUMNS.values() for column in columns} <= listed
     assert set(SENSOR_COLUMNS) <= listed
+
+
+def test_reference_lists_every_package_or_says_that_it_is_internal():
+    text, root = page("api.rst"), DOCS.parent / "mapfilter"
+    packages = {path.parent.name for path in root.glob("*/__init__.py")}
+    modules = {path.stem for path in root.glob("[a-z]*.py")}
+    listed = set(re.findall(r"^   mapfilter\.(\w+)$", text, re.MULTILINE))
+    internal = set(re.findall(r"``mapfilter\.(\w+)``", text))
+    assert listed | internal == packages | modules
+    assert not listed & internal

@@ -51,6 +51,7 @@ def test_each_axis_changes_what_a_sweep_runs(key):
     [
         *("journeys.count", "journeys.seed", "database.tile_px", "filter.kalman.timing_memory_m"),
         *(f"filter.kalman.fix_lasting_{name}" for name in ("share", "m", "s")),
+        *("filter.kalman.turn_drift_deg_per_sqrt_m", "filter.kalman.turn_rate_sd_deg_per_s"),
     ],
 )
 def test_what_a_sweep_does_not_use_is_no_axis(key):

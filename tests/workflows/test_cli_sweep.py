@@ -339,6 +339,14 @@ def test_axes_that_cannot_be_varied(own_world, axes, expected):
     assert not (own_world.out / "sweep").exists()
 
 
+@pytest.mark.parametrize("name", ["max_particles", "min_search_particles", "min_particles"])
+def test_a_grid_has_no_particles_to_vary(own_world, name):
+    """Each value ran the same again, under another name."""
+    given = ("-c", own_world.toml, "--vary", f"filter.bayes.{name}=4000,9000")
+    refused = mapfilter("sweep", *given, "--set", "filter.name=grid")
+    assert_refused(refused, f"--vary filter.bayes.{name}", "one without effect")
+
+
 def test_a_dry_run_counts_and_estimates(own_world):
     given = ("-c", own_world.toml, *SMALL, *VARIED, "--dry-run", "--json")
     found = assert_done(mapfilter("sweep", *given)).json

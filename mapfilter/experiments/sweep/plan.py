@@ -15,6 +15,7 @@ import numpy as np
 
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.positioning import BUILT_IN
+from mapfilter.positioning.bayes.options import GridFilter
 from mapfilter.positioning.filter import FilterOptions
 from mapfilter.simulation.journeys import JourneyPlan
 from mapfilter.simulation.reports import ReportModel
@@ -33,6 +34,8 @@ NO_TURNS = (
     "simulated motion has headings, and filters use turns only without; a custom filter may use "
     'those of turns = "gyro"'
 )
+
+_OF_PARTICLES = ("max_particles", "min_search_particles", "min_particles")
 
 LONGEST_BATCH = 100
 SHORTEST_BATCH = 24
@@ -213,12 +216,14 @@ class SweepPlan:
 
     @property
     def effective(self) -> SweepPlan:
-        """The plan without errors of turns that no filter of it uses."""
+        """The plan without numbers of particles on a grid, and errors of turns that none uses."""
+        readings = tuple(replace(one, choice=_effective(one.choice)) for one in self.readings)
         if all(self._uses_turns(noise) for noise in self.noises):
-            return self
+            return replace(self, readings=readings)
         without = dict.fromkeys(GYRO_ERRORS, 0.0)
         return replace(
             self,
+            readings=readings,
             noises=tuple(
                 one if self._uses_turns(one) else replace(one, **without)  # type: ignore[arg-type]
                 for one in self.noises
@@ -240,6 +245,14 @@ class SweepPlan:
     def digest(self) -> str:
         """SHA-256 of the plan."""
         return hashlib.sha256(self.as_json.encode()).hexdigest()
+
+
+def _effective(choice: FilterOptions) -> FilterOptions:
+    """Return the options of a filter with those at their defaults that it does not read."""
+    if not isinstance(choice, GridFilter):
+        return choice
+    usual = GridFilter()
+    return replace(choice, **{name: getattr(usual, name) for name in _OF_PARTICLES})
 
 
 def noise_grid(
