@@ -77,7 +77,8 @@ _OTHER_NAMES = {
 }
 _WORDS = {
     **dict.fromkeys(("radian", "radians"), "rad"),
-    **dict.fromkeys(("degree", "degrees"), "deg"),
+    # In German a "Grad" is a degree; gradians are found as "gon", too.
+    **dict.fromkeys(("degree", "degrees", "grad"), "deg"),
     **dict.fromkeys(("metre", "metres", "meter", "meters"), "m"),
     **dict.fromkeys(("kilometre", "kilometres", "kilometer", "kilometers"), "km"),
     **dict.fromkeys(("feet", "foot"), "ft"),

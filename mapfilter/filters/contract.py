@@ -217,6 +217,19 @@ def checked_pair(
     raise ReturnTypeError(function, f"({first}, {second.__name__})", got)
 
 
+def check_kinds(function: str, status: object, reason: object) -> None:
+    """Check the status and the reason that a function of a filter returned: texts are neither.
+
+    Raises
+    ------
+    ReturnTypeError
+        One of them is of another type.
+    """
+    for value, kind in ((status, Status), (reason, Reason)):
+        if not isinstance(value, kind):
+            raise ReturnTypeError(function, f"a {kind.__name__}", repr(value)[:40])
+
+
 def checked_estimate(returned: Any) -> Estimate:
     """Return what ``locate`` returned; ReturnTypeError where it is no estimate."""
     if isinstance(returned, Estimate):

@@ -18,6 +18,7 @@ from mapfilter.filters.contract import (
     Reason,
     Status,
     UpdateInfo,
+    check_kinds,
     checked_estimate,
     checked_pair,
 )
@@ -133,6 +134,7 @@ class BeliefTracker(Filter[TrackState]):
         if reading is not None:
             updated = self.filter.update(belief, reading, rng)
             belief, info = checked_pair(updated, "update", "belief", UpdateInfo)
+            check_kinds("update", info.status, info.reason)
             status, count, reason = info.status, info.hypotheses, info.reason
             label = _unused(epoch, SERVING, cell, reason)
             if reason not in _SILENT and label not in unused:

@@ -25,7 +25,7 @@ import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, MapfilterError, fail
-from mapfilter.filters.contract import ReturnTypeError, checked_pair
+from mapfilter.filters.contract import ReturnTypeError, check_kinds, checked_pair
 from mapfilter.positioning.belief_tracker import BeliefTracker, TrackState
 from mapfilter.positioning.candidate import cell_points, startable
 from mapfilter.positioning.epochs import Epoch
@@ -296,4 +296,7 @@ class CustomEpochFilter(Filter[Any]):
     def step(self, state: Any, epoch: Epoch, rng: np.random.Generator) -> tuple[Any, StepOutput]:
         """Take one epoch."""
         with wrap_user_errors(self.name, self.filter):
-            return checked_pair(self.filter.step(state, epoch, rng), "step", "state", StepOutput)
+            returned = self.filter.step(state, epoch, rng)
+            after, output = checked_pair(returned, "step", "state", StepOutput)
+            check_kinds("step", output.fix.status, output.fix.reason)
+            return after, output

@@ -9,6 +9,7 @@ one for the other shifts everything by half a pixel.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -173,6 +174,10 @@ def _rows(
             expected = f"the name of a file in {table.path.parent}"
             got = repr(given["FILE_NAME"][:80])
             hint = "rasters moved elsewhere, or exported to another folder"
+            own = re.split(r"[\\/]", given["FILE_NAME"])[-1]
+            if own != given["FILE_NAME"] and (beside := names.get(own.lower())):
+                hint = f"a path of another computer; {beside} is beside the index: "
+                hint += "leave its name alone"
             if _leads_out(table.path.parent, given["FILE_NAME"], names):
                 got += ", a link out of the folder"
                 hint = "rasters linked instead of copied; links out of the folder are not followed"

@@ -91,8 +91,9 @@ def run_check(config: Config, progress: Progress | None = None) -> CheckResult:
         check.check_rasters(ground_truth, check.plan(ground_truth.lattice))
     done(3)
     if plan is not None and lattice is not None:
-        # Rasters that are there already do not need the antennas.
-        check.check_antennas(plan, lattice, "error" if rasters is None else "warning")
+        # Rasters that are there already do not need the antennas, be they readable or not.
+        predicted = rasters is None and not config.rasters_path.exists()
+        check.check_antennas(plan, lattice, "error" if predicted else "warning")
     done(4)
     if area is not None and placed:
         check.check_roads(area, rasters)

@@ -62,6 +62,16 @@ class Talking(Counting):
         return belief, "all is well"
 
 
+class Naming(Counting):
+    def update(self, belief, epoch, rng):
+        return belief, UpdateInfo(Reason.USED, "TRACKING", 7)
+
+
+class Reasoning(Counting):
+    def update(self, belief, epoch, rng):
+        return belief, UpdateInfo("used", Status.TRACKING, 7)
+
+
 class Floating(Counting):
     def locate(self, belief):
         return CROSSING
@@ -144,6 +154,8 @@ def test_what_a_function_makes_is_looked_at_too(tmp_path):
     [
         ("Failing", r"test_own_filter.py line \d+, in update: .*ValueError: the idea was wrong"),
         ("Talking", r"Talking, update: expected it to return \(belief, UpdateInfo\), found"),
+        ("Naming", "Naming, update: expected it to return a Status, found 'TRACKING'$"),
+        ("Reasoning", "Reasoning, update: expected it to return a Reason, found 'used'$"),
         ("Floating", "Floating, locate: expected it to return Estimate, found tuple$"),
     ],
 )

@@ -1,14 +1,16 @@
 """Errors in a custom filter: which are named with file and line, and which are passed on."""
 
 import json
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
 import pytest
 
 from mapfilter.errors import ConfigError, InputError, StoreError, fail
+from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.custom_filter import CustomEpochFilter, custom_filter, wrap_user_errors
-from mapfilter.positioning.step_output import StepOutput
+from mapfilter.positioning.step_output import Fix, StepOutput
 
 
 class Own:
@@ -114,7 +116,7 @@ class Whole(Plain):
         return f"hypotheses of {state}"
 
 
-OUTPUT = StepOutput("fix")
+OUTPUT = StepOutput(Fix.nowhere(3.0, Status.SEARCHING, Reason.USED))
 
 
 def test_a_filter_over_epochs_is_asked_for_what_it_has():
@@ -134,6 +136,16 @@ def test_a_step_without_an_output_breaks_the_contract():
     own = Plain()
     own.step = lambda *_: ("state", "no output")
     with pytest.raises(ConfigError, match=r"step: expected it to return \(state, StepOutput\)"):
+        CustomEpochFilter(own, "package:Own", "EPSG:32632").step("state", "epoch", "rng")
+
+
+def test_a_status_of_a_step_is_no_text():
+    own = Plain()
+    fix = replace(Fix.nowhere(3.0, Status.SEARCHING, Reason.USED), status="SEARCHING")
+    own.step = lambda *_: ("state", StepOutput(fix))
+    with pytest.raises(
+        ConfigError, match="step: expected it to return a Status, found 'SEARCHING'"
+    ):
         CustomEpochFilter(own, "package:Own", "EPSG:32632").step("state", "epoch", "rng")
 
 

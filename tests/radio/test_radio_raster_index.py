@@ -91,6 +91,19 @@ def test_names_that_lead_elsewhere_are_no_files(tmp_path, name):
     assert "FILE_NAME: expected the name of a file" in str(caught.value)
 
 
+@pytest.mark.parametrize("folder", ["C:\\Work\\losses\\", "losses\\", "/srv/losses/", "../losses/"])
+def test_paths_of_another_computer_are_named_as_such(tmp_path, folder):
+    write_bil(tmp_path / "a.bil", LATTICE, np.full((6, 8), 100, np.int16))
+    path = index(tmp_path, f"TX_NAME;FILE_NAME\nA;{folder}A.BIL\nB;{folder}b.bil\n")
+    with pytest.raises(InputError) as caught:
+        read_index(path)
+    first, second = caught.value.faults
+    assert (
+        first.hint == "a path of another computer; a.bil is beside the index: leave its name alone"
+    )
+    assert second.hint == "rasters moved elsewhere, or exported to another folder"
+
+
 def row(**changes):
     values = {"resolution_m": 5.0, "bits": 16.0, "area_m": LATTICE.bounds_m}
     return IndexRow("index row 2", "A", Path("a.bil"), **(values | changes))

@@ -87,6 +87,8 @@ def test_decibels_are_no_level(tmp_path):
         ("acc_x", "acc_x [g]", "g"),
         ("acc_x", "Acc X (m/s^2)", "m/s2"),
         ("gyr_z", "gyro z [deg s⁻¹]", "deg/s"),
+        ("yaw_rate_degps", "Gierrate [Grad/s]", "deg/s"),
+        ("compass_deg", "Kompass (Grad)", "deg"),
         ("mag_x", "mag x [µT]", "ut"),
         ("level_dbm", "RSRP [dBm]", "dbm"),
         ("level_dbm", "rsrp_dbm", "dbm"),

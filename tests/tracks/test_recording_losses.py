@@ -203,6 +203,15 @@ def test_levels_above_the_largest_asu_have_lost_their_sign(tmp_path):
     assert (both[0].dropna() == both[1][both[0].notna()]).all()
 
 
+def test_identities_that_a_spreadsheet_shortened_are_told(walk, read):
+    walk["ci"] = [f"{number:.4E}" for number in 123_456_700 + walk["ci"]]
+    told = (
+        "ci: 200 values are no numbers, taken as missing (first '1.2347E+08' in line 2; shortened"
+    )
+    (note,) = [note for note in read(walk).notes if told in note]
+    assert note.endswith("shortened by a spreadsheet: show all digits there, and export again)")
+
+
 def write(folder, text):
     (folder / "true.csv").write_text(text)
     return "true.csv"

@@ -195,6 +195,12 @@ def test_another_format_is_named(written):
         (b"hello\nworld\n", "none of them"),
         (b"lat,lon\n60.1,24.9\n", "without a column of times.* such as time=COLUMN"),
         (b"time,lat,Laenge\n1,60.1,24.9\n", "likely: a CSV with other names of columns: --column"),
+        (
+            b"cell,lat,lon,azimuth_deg,eirp_dbm\nA,60,24,0,55\n",
+            "likely: a list of cells, no journey",
+        ),
+        (b"Transmitter;X;Y;Height (m);Antenna\nA;1;2;3;a\n", "likely: a list of cells, no journey"),
+        (b"lat,lon,azimuth,height\n60,24,9,1\n", "likely: a CSV without a column of times"),
         (gzip.compress(b"", mtime=0), "an empty file"),
     ],
 )

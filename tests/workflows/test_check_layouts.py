@@ -159,3 +159,13 @@ def test_a_misspelt_antenna(world):
     (finding,) = outcome.json["findings"]
     assert (finding["code"], finding["severity"]) == ("antenna-missing", "warning")
     assert "Did you mean 'sector' in place of 'sectr'?" in finding["evidence"]
+
+
+def test_antennas_matter_little_beside_rasters_that_cannot_be_read(world):
+    """A database takes its levels from these rasters, once they are mended."""
+    world.row("S2A")["antenna"] = "sectr"
+    world.write()
+    world.rasters.write_bytes(b"no raster")
+    outcome = mapfilter("check", "-c", world.toml, "--json")
+    codes = {(f["code"], f["severity"]) for f in outcome.json["findings"]}
+    assert codes == {("rasters-invalid", "error"), ("antenna-missing", "warning")}

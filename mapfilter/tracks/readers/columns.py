@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -23,6 +24,7 @@ from mapfilter.tracks.readers.times import LEAST_UNIX_S, parse_times, seconds_of
 _NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
 _DIGIT = r"\d"
 _WHOLE = r"^(?:[-+]?(\d{1,18}|[0-8]\d{18})|0[xX][0-9a-fA-F]{1,15})$"
+_SHORTENED = re.compile(r"\d+(?:[.,]\d+)?[eE]\+?\d+")
 MISSING = ("", "-", "nan", "NaN", "NA", "N/A", "null", "NULL", "None", "none", "#N/A")
 """Texts of missing values."""
 
@@ -264,6 +266,8 @@ class Columns:
         if bad:
             at = pc.index(wrong, value=True).as_py()
             first = f"first {column[at].as_py()[:40]!r} in line {self.line[at]}"
+            if pa.types.is_integer(kind) and _SHORTENED.fullmatch(column[at].as_py()):
+                first += "; shortened by a spreadsheet: show all digits there, and export again"
             self.reading.count(
                 lambda n: (
                     f"{name}: {number_of(n, 'value is no number', 'values are no numbers')}, "

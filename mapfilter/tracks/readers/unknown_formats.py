@@ -19,6 +19,7 @@ from mapfilter.tracks.readers.text import Text
 
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
 _CELLS, _PLACES = {"cell", "cgi", "ci"}, {"lat_deg", "lon_deg", "east_m", "north_m"}
+_OF_PLANS = ("eirp", "antenna"), ("azimut", "tilt", "height")
 _LIST = "docs/howto/recordings.rst lists them"
 JSON = ('{"', '[{"')
 _FIELD_OF_UNIT = {
@@ -81,6 +82,8 @@ def unknown_format(
     hint = NOT_READ.get(path.suffix.lower(), "") or _other_separators(path, text, find_format)
     if text.first_line.lstrip().startswith(JSON):
         hint = hint or NOT_READ[".json"]
+    if is_table and not hint and _is_plan(names):
+        hint = "a list of cells, no journey: name it as [cells] plan"
     if is_table and not hint:
         raw = {"databytes", "data bytes", "dlc"} & set(names)
         hint = RAW_FRAMES if raw else other_names(names)
@@ -88,6 +91,11 @@ def unknown_format(
     if is_table:
         got = f"none of them, but a table with the columns {listed([n for n in names if n])}"
     return fail(InputError, str(path), f"a recording in a known format ({_LIST})", got, hint)
+
+
+def _is_plan(names: Sequence[str]) -> bool:
+    """Return whether the columns of a table are those of antennas."""
+    return all(any(part in name for name in names for part in some) for some in _OF_PLANS)
 
 
 def other_names(names: Sequence[str]) -> str:
