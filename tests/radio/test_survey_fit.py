@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import pdist, squareform
+from sklearn.gaussian_process import GaussianProcessRegressor
 
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.lattice import Lattice
@@ -13,7 +15,12 @@ from mapfilter.survey.measured_map import fit_survey
 from mapfilter.survey.measured_points import Points, points_by_cell
 from mapfilter.survey.measurements import Measurements
 from mapfilter.survey.options import SurveyOptions
-from mapfilter.survey.residual_field import GaussianField, Shadowing, learn_shadowing
+from mapfilter.survey.residual_field import (
+    GaussianField,
+    Shadowing,
+    learn_shadowing,
+    log_likelihood,
+)
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385_000.0, 6_673_000.0, 5.0, 160, 160)
@@ -146,6 +153,19 @@ def test_shadowing_is_learnt_from_all_cells_together():
     assert 20 < np.mean([s.variance_db2 for s in found]) < 50
     assert 35 < np.mean([s.correlation_m for s in found]) < 95
     assert 2 < np.mean([s.noise_db2 for s in found]) < 7
+
+
+@pytest.mark.parametrize("shadowing", [Shadowing(), Shadowing(3.0, 400.0, 0.7)])
+def test_the_likelihood_of_shadowing_is_that_of_scikit_learns_process(shadowing):
+    places_m = np.column_stack(somewhere(40, seed=6))
+    residual_db = np.random.default_rng(7).normal(0, 5, 40)
+    process = GaussianProcessRegressor(Shadowing().kernel, optimizer=None, alpha=0.0)
+    process.fit(places_m, residual_db)
+    theta = np.log([shadowing.variance_db2, shadowing.correlation_m, shadowing.noise_db2])
+    expected = process.log_marginal_likelihood(theta, eval_gradient=True)
+    found = log_likelihood(theta, squareform(pdist(places_m)), residual_db)
+    for own, other in zip(found, expected, strict=True):
+        np.testing.assert_allclose(own, other, rtol=1e-10)
 
 
 def test_nothing_is_learnt_from_single_points():
