@@ -61,10 +61,30 @@ class Session:
         128 random bits; who knows it may use the session.
     name : str
         As the client calls it; may be empty.
+    seed : int
+        Of its random generator.
+    began_utc_s : float
+        When it began, Unix time.
     progress : Progress or None
         None while it is on disk only.
-    saved_epochs : int
-        Epochs that are on disk; -1 for nothing.
+    epochs, time_s, last
+        As of :class:`Progress`, also while that is on disk.
+    saved_epochs, saved_time_s : int and float
+        Epochs that are on disk, and the time of the last of them; -1 and NaN for nothing.
+    used_s : float
+        When it was last used, of the monotonic clock.
+    bytes : int
+        Memory of its state.
+    waiting : int
+        Requests that wait for it.
+    ended : bool
+        Whether it is to be used no more.
+    fault_told : bool
+        Whether a fault in what a page shows was reported.
+    lock : asyncio.Lock
+        Held by the request that uses the state.
+    channel : Channel
+        To the pages that watch it.
     stated : LogStatement
         What the device's log states, which its filter is fitted to.
     """

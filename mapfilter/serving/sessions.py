@@ -17,16 +17,11 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any, TypeVar
 
-from mapfilter.errors import Faults
 from mapfilter.radio.plan_names import PlanNames
 from mapfilter.serving.documents import RequestError
-from mapfilter.serving.filters import (
-    SessionFilter,
-    SessionFilters,
-    statement_document,
-    statement_of,
-)
+from mapfilter.serving.filters import SessionFilter, SessionFilters
 from mapfilter.serving.limits import ServiceLimits
+from mapfilter.serving.saved_session import restored_progress, restored_session, saved_value
 from mapfilter.serving.session import Progress, Session
 from mapfilter.serving.steps import SEED_BITS, Stepped, first, shown_or, stepped, wanted
 from mapfilter.serving.store import SessionStore
@@ -237,29 +232,13 @@ class Sessions:
     def restore(self, found: Mapping[str, Mapping[str, Any]]) -> None:
         """Take saved sessions, whose states stay on disk until they are used."""
         for session_id, saved in found.items():
-            self.all[session_id] = Session(
-                session_id,
-                saved["name"],
-                saved["seed"],
-                saved["began_utc_s"],
-                None,
-                saved["epochs"],
-                saved["time_s"],
-                saved["last"].encode(),
-                saved["epochs"],
-                saved["time_s"],
-                stated=statement_of(saved["stated"], Faults()),
-            )
-            if saved["last"]:
-                self.all[session_id].channel.keep(saved["epochs"], saved["last"].encode())
+            self.all[session_id] = restored_session(session_id, saved)
 
     async def _loaded(self, session: Session) -> Progress:
         if session.progress is None:
             assert self.store is not None
             saved = await self._in(self.saver, partial(self.store.read, session.id))
-            state, rng, epochs = saved["state"], saved["rng"], saved["epochs"]
-            last = saved["last"].encode()
-            session.take(Progress(state, rng, epochs, saved["time_s"], last))
+            session.take(restored_progress(saved))
         assert session.progress is not None
         return session.progress
 
@@ -267,17 +246,7 @@ class Sessions:
         progress = session.progress
         if self.store is None or progress is None or progress.epochs == session.saved_epochs:
             return
-        value = {
-            "name": session.name,
-            "seed": session.seed,
-            "began_utc_s": session.began_utc_s,
-            "stated": statement_document(session.stated),
-            "state": progress.state,
-            "rng": dict(progress.rng),
-            "epochs": progress.epochs,
-            "time_s": progress.time_s,
-            "last": progress.last.decode(),
-        }
+        value = saved_value(session, progress)
         await self._in(self.saver, partial(self.store.write, session.id, value))
         session.saved_epochs, session.saved_time_s = progress.epochs, progress.time_s
         if session.ended:

@@ -22,6 +22,20 @@ PIXELTYPE {kind}
 NODATA {nodata}
 """
 INDEX_HEADER = "TX_NAME;FILE_NAME;RESOLUTION;AREA_XMIN;AREA_XMAX;AREA_YMIN;AREA_YMAX;NBITS\n"
+WINDOWS = (
+    ((0, 0, 6, 8), True),
+    ((5, 7, 1, 1), True),
+    ((5, 0, 1, 8), True),
+    ((0, 0, 7, 8), False),
+    ((0, 0, 6, 9), False),
+    ((-1, 0, 2, 2), False),
+    ((0, -1, 2, 2), False),
+    ((6, 0, 1, 1), False),
+    ((0, 8, 1, 1), False),
+    ((0, 0, 0, 1), False),
+    ((0, 0, 1, 0), False),
+)
+"""Windows, and whether they lie on a lattice of 6 rows and 8 columns."""
 
 
 def write_bil(

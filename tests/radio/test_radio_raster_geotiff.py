@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from raster_files import WINDOWS
 from rasterio import Affine
 
 from mapfilter._gdal import check_blocks
@@ -204,22 +205,7 @@ def rasters(tmp_path_factory):
     return open_rasters(path)
 
 
-@pytest.mark.parametrize(
-    ("window", "fits"),
-    [
-        ((0, 0, 6, 8), True),
-        ((5, 7, 1, 1), True),
-        ((5, 0, 1, 8), True),
-        ((0, 0, 7, 8), False),
-        ((0, 0, 6, 9), False),
-        ((-1, 0, 2, 2), False),
-        ((0, -1, 2, 2), False),
-        ((6, 0, 1, 1), False),
-        ((0, 8, 1, 1), False),
-        ((0, 0, 0, 1), False),
-        ((0, 0, 1, 0), False),
-    ],
-)
+@pytest.mark.parametrize(("window", "fits"), WINDOWS)
 def test_windows_on_the_lattice(rasters, window, fits):
     if fits:
         assert rasters.read(window).shape == (2, *window[2:])

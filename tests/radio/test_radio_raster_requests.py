@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from raster_files import WINDOWS
 
 from mapfilter.errors import InputError
 from mapfilter.lattice import Lattice
@@ -57,21 +58,7 @@ def test_cells_are_read_in_the_order_wanted(cells, window):
     np.testing.assert_array_equal(in_memory()[0].read(), in_memory()[1])
 
 
-@pytest.mark.parametrize(
-    ("window", "fits"),
-    [
-        ((5, 7, 1, 1), True),
-        ((0, 0, 6, 8), True),
-        ((0, 0, 7, 8), False),
-        ((0, 0, 6, 9), False),
-        ((-1, 0, 2, 2), False),
-        ((0, -1, 2, 2), False),
-        ((6, 0, 1, 1), False),
-        ((0, 8, 1, 1), False),
-        ((0, 0, 0, 1), False),
-        ((0, 0, 1, 0), False),
-    ],
-)
+@pytest.mark.parametrize(("window", "fits"), WINDOWS)
 def test_requests_lie_on_the_lattice(window, fits):
     held, _ = in_memory()
     if fits:
