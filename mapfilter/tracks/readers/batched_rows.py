@@ -18,7 +18,7 @@ _FEWEST_CHANGES, _CHANGING, _CHANGING_ALIKE = 5.0, 0.05, 0.01
 """Least number, and shares of all times, of changes between times given once and those given twice:
 a part that was delivered twice begins and ends but once. The latter share counts where rows of
 different times are equal, too, so that being equal tells nothing."""
-_ALIKE = 0.9
+_ALIKE = _STEADY = 0.9
 _STEP_M, _STEPS_PER_S = (0.3, 1.1), (1.5, 2.5)
 """Lengths of one step, and how many of them a walker makes."""
 
@@ -76,7 +76,7 @@ def times_of_cut_seconds(
     alike : bool
         Whether rows of different times are equal, too, but for these.
     walked : bool
-        Whether these are surely the steps of a walker.
+        Whether they are as long, and as many, as the steps of a walker: two in all seconds count.
 
     Returns
     -------
@@ -99,7 +99,9 @@ def times_of_cut_seconds(
     doubled = 2 * repeats == count if alike else 2 * repeats >= count
     changes = np.count_nonzero(np.diff(doubled))
     share = _CHANGING_ALIKE if alike else _CHANGING
-    apart = walked or changes >= max(_FEWEST_CHANGES, share * times.size)
+    # A part that was delivered twice lies beside one that was not.
+    steady = walked and np.mean(doubled) >= _STEADY
+    apart = steady or changes >= max(_FEWEST_CHANGES, share * times.size)
     if not apart or count.max() > STEPS_PER_S:
         return time_s
     spread: Floats = time_s + (np.arange(time_s.size) - np.repeat(first, count)) / np.repeat(
