@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from numbers import Real
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import numpy as np
 from mapfilter._arguments import PATH, Argument, Entries, Setting, check_arguments, shown
 from mapfilter.api.python_words import python_log
 from mapfilter.errors import ConfigError, Faults, fail
+from mapfilter.geodesy import projected_crs, same_crs, short_crs, shown_crs
 from mapfilter.tracks import log as tables
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.motion_factors import check_factors
@@ -19,6 +21,7 @@ from mapfilter.tracks.named_files import check_origin, offsets_by_path
 from mapfilter.tracks.open_log import open_log
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.pdr.options import WalkOptions
+from mapfilter.tracks.placeless import LOCAL_FRAME, is_local_frame
 
 _FILES = "a path, or several"
 _WALK = WalkOptions()
@@ -50,7 +53,7 @@ def read_log(
         or a folder of them.
     crs : str
         Projected CRS for recordings, such as ``database.lattice.crs``; else the UTM zone of their
-        positions.
+        positions. A track log keeps its own, and has a note where that is another one.
     truth : path, or several
         Recordings whose positions are the truth, and no measurements.
     format : str
@@ -115,7 +118,13 @@ def read_log(
         factors=factors or {},
     )
     options = OpenOptions(format=format, zone=zone, columns=columns or {}, combine=combine)
-    return open_log(given, crs=crs, options=options).log
+    opened = open_log(given, crs=crs, options=options)
+    log, kept = opened.log, bool(crs) and not opened.recordings
+    if kept and not same_crs(projected_crs(crs, "read_log, crs"), log.crs):
+        own = LOCAL_FRAME if is_local_frame(log.crs) else short_crs(log.crs)
+        why = f"a track log is in its own, {own}"
+        log = replace(log, notes=(*log.notes, f"crs = {shown_crs(crs)} has no effect: {why}"))
+    return log
 
 
 @python_log

@@ -23,12 +23,21 @@ from mapfilter.cli.options import (
     WorkersOption,
     given_path,
     named_defaults,
+    named_options,
     refuse,
     seeded,
     toml,
 )
 from mapfilter.workflows.progress_bars import progress_bar
 from mapfilter.workflows.terminal import print_message, print_result, print_text
+
+_OF_BOUND = {
+    "FirstFixOptions, spacing_m": "--spacing",
+    "FirstFixOptions, journeys": "--journeys",
+    "ErrorModel, deviation_db": "--level-error",
+    "ErrorModel, correlation_m": "--correlation",
+}
+"""Options of ``bound`` by the places that faults name."""
 
 
 def check(
@@ -150,7 +159,7 @@ def merge(
     from mapfilter.workflows.databases import run_merge
 
     given = [given_path(path) or path for path in databases]
-    with progress_bar("merge") as progress:
+    with named_options({"without": "--without-cell"}), progress_bar("merge") as progress:
         result = run_merge(given, out.absolute(), without=without or (), progress=progress)
     print_result(result, as_json)
 
@@ -201,8 +210,9 @@ def bound(
     from mapfilter.evaluation.radio_map import ErrorModel
     from mapfilter.workflows.bound import run_bound
 
-    errors = ErrorModel(level_error_db, correlation_m)
-    options = FirstFixOptions(spacing_m=spacing_m, journeys=journeys)
+    with named_options(_OF_BOUND):
+        errors = ErrorModel(level_error_db, correlation_m)
+        options = FirstFixOptions(spacing_m=spacing_m, journeys=journeys)
     folder = (out or Path("bound")).absolute()
     with progress_bar("bound") as progress:
         result = run_bound(

@@ -240,22 +240,28 @@ def check_custom_filter(config: Config) -> None:
 
 @contextmanager
 def named_options(options: Mapping[str, str]) -> Iterator[None]:
-    """Name the option beside the setting that it made, where a configuration is wrong.
+    """Name the option beside the setting or argument that it made, where that is wrong.
 
     Parameters
     ----------
     options : mapping of str to str
-        Option of each setting.
+        Option of each place that faults name.
     """
     try:
         yield
-    except ConfigError as error:
+    except (ConfigError, InputError) as error:
         faults = []
         for fault in error.faults:
-            of = (o for key, o in options.items() if fault.where.startswith(f"setting {key}"))
+            # Another path may begin with the same letters.
+            where = f"{fault.where} "
+            of = (
+                option
+                for place, option in options.items()
+                if where.startswith(tuple(f"{place}{end}" for end in " ,.["))
+            )
             option = next(of, "")
             faults.append(replace(fault, where=f"{option}, {fault.where}") if option else fault)
-        raise ConfigError(tuple(faults)) from None
+        raise type(error)(tuple(faults)) from None
 
 
 def refuse(given: Mapping[str, object], whom: str) -> None:

@@ -243,7 +243,7 @@ def replay(
             given.append("filter.smooth=true")
         if protection is not None:
             given.append(f"integrity.risk={protection!r}")
-        with named_options({} if without is None else {"track.without": "--without"}):
+        with named_options({} if without is None else {"setting track.without": "--without"}):
             loaded = load_config(config, given)
         if walk and not loaded.track.steps:
             refuse(

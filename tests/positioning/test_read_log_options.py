@@ -78,3 +78,13 @@ def test_all_wrong_options_are_told_together(walk):
     with pytest.raises(mf.MapfilterError) as refused:
         mf.read_log(walk, offsets_s={"a": 1.0}, origin_deg=(91, 0), factors={"turn_rad": 0.0})
     assert len(refused.value.faults) == 3
+
+
+def test_a_track_log_keeps_its_crs_and_says_so(walk, tmp_path):
+    mf.write_log(mf.read_log(walk), tmp_path / "log")
+    other = mf.read_log(tmp_path / "log", crs="EPSG:3067")
+    assert other.crs == "EPSG:32635"
+    assert other.notes == ("crs = EPSG:3067 has no effect: a track log is in its own, EPSG:32635",)
+    for crs in ("", "EPSG:32635", "+proj=utm +zone=35 +datum=WGS84"):
+        assert mf.read_log(tmp_path / "log", crs=crs).notes == ()
+    assert mf.read_log(walk, crs="EPSG:3067").notes == ()

@@ -128,10 +128,10 @@ def test_equal_seeds_give_equal_bytes_and_others_other_journeys(database, tmp_pa
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        (["--spacing", "0"], "FirstFixOptions, spacing_m"),
-        (["--journeys", "0"], "FirstFixOptions, journeys"),
-        (["--level-error", "-1"], "ErrorModel, deviation_db"),
-        (["--correlation", "nan"], "ErrorModel, correlation_m"),
+        (["--spacing", "0"], "error: --spacing, FirstFixOptions, spacing_m: expected"),
+        (["--journeys", "0"], "error: --journeys, FirstFixOptions, journeys: expected"),
+        (["--level-error", "-1"], "error: --level-error, ErrorModel, deviation_db: expected"),
+        (["--correlation", "nan"], "error: --correlation, ErrorModel, correlation_m: expected"),
     ],
 )
 def test_impossible_options_are_refused(database, tmp_path, given, told):

@@ -30,7 +30,9 @@ def test_a_database_without_a_cell(world, tmp_path):
 def test_databases_that_cannot_be_merged(world, tmp_path):
     out = ("--out", tmp_path / "db")
     assert_refused(mapfilter("merge", tmp_path / "none", world.database, *out), "none")
-    assert_refused(mapfilter("merge", world.database, "--without-cell=X", *out), "'X'")
+    assert_refused(
+        mapfilter("merge", world.database, "--without-cell=X", *out), "--without-cell, ", "'X'"
+    )
     assert not (tmp_path / "db").exists()
 
 
