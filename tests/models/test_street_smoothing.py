@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mapfilter.models.street_ancestors import draw_ancestors
+from mapfilter.models.street_ancestors import _drawn, _Near, draw_ancestors
 
 PLACE, BIAS, SCALE = 4.0, 0.01, 0.0004
 
@@ -81,3 +81,19 @@ def test_the_same_key_draws_the_same():
         chosen = draw_ancestors(later, earlier, weight, *motion, -20.0, np.uint64(key))
         found.append(chosen.tolist())
     assert found[0] == found[1] != found[2]
+
+
+@pytest.mark.parametrize(
+    ("near", "start", "masses"),
+    [
+        # Two rows of two squares, and the first of each row; two squares of one row.
+        ((0, 2, 0, 1, 0, 3, 2), [0, 1, 1, 2, 2], [0.5, 0.0, 0.0, 1.0, 0.0, 0.0]),
+        ((0, 1, 0, 2, 0, 3, 2), [0, 1, 2], [0.5, 1.0, 0.0]),
+    ],
+)
+def test_a_number_at_the_mass_of_a_square_draws_from_the_next_one(near, start, masses):
+    """Each of two squares has a hypothesis of half the mass."""
+    squares = _Near(*near, np.array(start, dtype=np.int32), np.ones(6), np.array(masses))
+    before = np.array([0.0, 0.5, 1.0])
+    for goal, drawn in ((0.25, 0), (0.5, 1), (0.75, 1)):
+        assert _drawn(squares, before, goal) == (drawn, 1.0)
