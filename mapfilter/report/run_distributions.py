@@ -83,6 +83,10 @@ def _draw(axes: Axes, groups: Groups, column: str, label: str, of: str = "all") 
         draw_shares(axes, rows[column], label=name, **look)
     axes.set(xlabel=label, ylabel=f"share of {of} runs / %", ylim=(0, 101))
     axes.set_xlim(left=0)
+    if not any(rows[column].notna().any() for _, rows in groups):
+        told = "no run succeeded" if of == "successful" else "no run switched"
+        axes.text(0.5, 0.5, told, transform=axes.transAxes, ha="center", color=GREY)
+        axes.set_xticks([])
     tidy(axes)
 
 

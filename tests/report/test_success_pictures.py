@@ -176,6 +176,25 @@ def test_distributions_of_runs_that_never_switched(tmp_path):
     assert path.is_file()
 
 
+def test_an_empty_distribution_says_why():
+    """Axes of hundredths of a metre look like a result."""
+    some, none = [("some", runs(9))], [("never", runs(9, switched=False))]
+    for groups, told in ((some, [[], [], []]), (some + none, [[], [], []])):
+        panels = plot_run_distributions(groups, title="a town").axes
+        assert [said(axes) for axes in panels] == told
+    panels = plot_run_distributions(none, title="a town").axes
+    assert [said(axes) for axes in panels] == [
+        ["no run switched"],
+        ["no run succeeded"],
+        ["no run switched"],
+    ]
+    assert [len(axes.get_xticks()) for axes in panels[1:]] == [0, 0]
+
+
+def said(axes):
+    return [text.get_text() for text in axes.texts if "run" in text.get_text()]
+
+
 def with_radii(coverage, radius_m, **place):
     low, high = max(coverage - 0.1, 0.0), min(coverage + 0.05, 1.0)
     ends = {"coverage_95": coverage, "coverage_95_low": low, "coverage_95_high": high}
