@@ -234,6 +234,8 @@ class BayesPositioner(Filter[BayesState]):
             state = replace(state, last_fix=epoch.fix)
         if gnss.was_used(epoch.time_s):
             state = replace(state, watch=state.watch.positioned(epoch.time_s))
+        elif epoch.fix is not None and gnss.rejecting:
+            state = replace(state, watch=state.watch.contradicted())
         if reason not in _TOLD_ELSEWHERE:
             # Of a report without a serving cell, the first one.
             named = (row.cell for row in epoch.radio if row.cell is not None)
