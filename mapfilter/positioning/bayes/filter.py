@@ -219,10 +219,13 @@ class BayesPositioner(Filter[BayesState]):
                 positioned = gnss_of(state).was_used(epoch.time_s)
                 state = judged(self.beliefs, state, weighed=used, positioned=positioned)
         unused += doubted(self.beliefs, state, hold, epoch, unused, moves=motion is Reason.USED)
-        if gnss_of(state).was_used(epoch.time_s):
+        gnss = gnss_of(state)
+        if gnss.was_used(epoch.time_s):
             last_fix = state.last_fix if epoch.fix is None else epoch.fix
             watch = state.watch.positioned(epoch.time_s)
             state = replace(state, last_fix=last_fix, watch=watch)
+        elif epoch.fix is not None and gnss.rejecting:
+            state = replace(state, watch=state.watch.contradicted())
         if reason not in _TOLD_ELSEWHERE:
             # Of a report without a serving cell, the first one.
             named = (row.cell for row in epoch.radio if row.cell is not None)

@@ -57,6 +57,9 @@ class SensorWatch(NamedTuple):
         as there was none though positions have moved.
     short : ShortSteps
         Steps that wait until they are long enough.
+    are_astray : bool
+        Whether positions contradicted the belief while steps were as usual, and none has been used
+        since: they do not show how far one is carried without steps.
     """
 
     pace: Pace = Pace()
@@ -75,6 +78,7 @@ class SensorWatch(NamedTuple):
     rode_unheard: bool = False
     has_motion: bool = True
     short: ShortSteps = ShortSteps()
+    are_astray: bool = False
 
     @property
     def is_unmeasured(self) -> bool:
@@ -93,9 +97,20 @@ class SensorWatch(NamedTuple):
         """
         way = self.undirected.positioned()
         watch = self if way is self.undirected else self._replace(undirected=way)
+        if watch.are_astray:
+            watch = watch._replace(are_astray=False)
         if self.rest is None or not self.rest.measured_m > 0:
             return watch
         return watch.after_way(time_s)
+
+    def contradicted(self) -> SensorWatch:
+        """Return the watch after a position that contradicts the belief.
+
+        While steps are as usual, the position is wrong, or the belief. Once they are fewer, it may
+        be the counter.
+        """
+        is_usual = self.pace.rows > 0 and self.rest is None and not self.places.rows
+        return self._replace(are_astray=True) if is_usual and not self.are_astray else self
 
     def carried(self) -> SensorWatch:
         """Return the watch of what goes on though no step is counted, as positions have shown.

@@ -137,6 +137,8 @@ def _among_places(
     time_s = epoch.time_s
     if not watch.pace.rows and watch.places.are_left_by(epoch.fix):
         watch = watch._replace(has_motion=False)
+    if watch.are_astray:
+        return watch, None
     places = watch.places.after(time_s, epoch.fix, gone_m)
     found = places.carried if places is not watch.places else None
     if watch.rest is not None and watch.rest.is_carried and (standing := places.standing):
