@@ -15,7 +15,7 @@ import pandas as pd
 from mapfilter._arguments import Entries, Setting, check_arguments, generator
 from mapfilter._words import number_of
 from mapfilter.api.given import log_argument, opened, optional_database
-from mapfilter.api.mapless import middle_of_sites, over_sites, own_sites, without_sites
+from mapfilter.api.mapless import over_sites, own_sites, without_sites
 from mapfilter.api.motion import with_right_motion
 from mapfilter.api.python_words import python_words
 from mapfilter.database.radioroutes import RadioRouteDatabase
@@ -220,7 +220,8 @@ def locate(
     given_filter = filter_options(filter) if isinstance(filter, str) else filter
     database = None if database is None else opened(database)
     plan = own_sites(given_filter) if database is None else database.plan
-    about_deg = middle_of_sites(plan) if database is None else database.lattice.middle_deg
+    about_deg = None if plan is None else plan.middle_deg
+    about_deg = about_deg if database is None else database.lattice.middle_deg
     log = with_right_motion(log, "" if plan is None else plan.crs, about_deg, factors or {})
     if plan is None:
         log, plan = without_sites(log), CellPlan(log.crs, ())

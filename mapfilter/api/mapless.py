@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from mapfilter.errors import ConfigError, fail
-from mapfilter.geodesy import unproject
 from mapfilter.positioning import BUILT_IN
 from mapfilter.positioning.kalman.filter import KalmanFilter, KalmanTracker
 from mapfilter.positioning.kalman.siteless import needs_sites, without_cells
@@ -40,15 +37,6 @@ def own_sites(given: Any) -> CellPlan | None:
     expected = f"a database of open_database or build, or its path, for the filter {name}"
     hint = f'left out; {able} need none, as in locate(log, filter="ekf")'
     raise fail(ConfigError, "locate, database", expected, "None", hint)
-
-
-def middle_of_sites(plan: CellPlan | None) -> tuple[float, float] | None:
-    """Return latitude and longitude of the middle of all cells, WGS 84; None without any."""
-    if plan is None or not plan.cells:
-        return None
-    places_m = [(cell.east_m, cell.north_m) for cell in plan.cells]
-    lon_deg, lat_deg = unproject(plan.crs, *np.mean(places_m, axis=0))
-    return float(lat_deg), float(lon_deg)
 
 
 def without_sites(log: TrackLog) -> TrackLog:

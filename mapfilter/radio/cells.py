@@ -9,6 +9,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 
+import numpy as np
+
 from mapfilter._io import atomic_file
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail
@@ -146,6 +148,15 @@ class CellPlan:
     def ids(self) -> tuple[str, ...]:
         """Ids in the plan's order."""
         return tuple(cell.id for cell in self.cells)
+
+    @property
+    def middle_deg(self) -> tuple[float, float] | None:
+        """Latitude and longitude of the middle of all cells, WGS 84; None without any."""
+        if not self.cells:
+            return None
+        places_m = [(cell.east_m, cell.north_m) for cell in self.cells]
+        lon_deg, lat_deg = unproject(self.crs, *np.mean(places_m, axis=0))
+        return float(lat_deg), float(lon_deg)
 
     @cached_property
     def _positions(self) -> Mapping[str, int]:

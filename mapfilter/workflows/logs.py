@@ -41,7 +41,7 @@ def journeys_of(config: Config) -> list[Path]:
 
 
 def open_journey(
-    config: Config, path: Path, area: Lattice | None = None, plan: CellPlan | None = None
+    config: Config, path: Path, area: Lattice | None = None, sites: CellPlan | None = None
 ) -> OpenedLog:
     """Open a journey, with the recordings that the section adds to it.
 
@@ -50,18 +50,17 @@ def open_journey(
     area : Lattice, optional
         Of the database, whose CRS recordings have; else that of the configuration's area, else the
         UTM zone of positions. A log without a CRS and positions is one of it.
-    plan : CellPlan, optional
-        Gives reported cells its ids.
+    sites : CellPlan, optional
+        Where a log without positions was made, if there is no database.
     """
-    options = open_options(config.track)
-    crs = "" if area is None else area.crs
-    if area is not None:
-        combine = replace(options.combine, about_deg=area.middle_deg)
+    options, placed = open_options(config.track), sites if area is None else area
+    if placed is not None:
+        combine = replace(options.combine, about_deg=placed.middle_deg)
         options = replace(options, combine=combine)
-    elif config.area.crs is not None:
+    crs = "" if area is None else area.crs
+    if area is None and config.area.crs is not None:
         crs = projected_crs(config.area.crs, "area.crs")
-    paths = [path, *config.track.recordings]
-    opened = open_log(paths, crs=crs, plan=plan, options=options)
-    if area is None:
+    opened = open_log([path, *config.track.recordings], crs=crs, options=options)
+    if placed is None:
         return opened
-    return replace(opened, log=in_frame(opened.log, area.crs, area.middle_deg))
+    return replace(opened, log=in_frame(opened.log, placed.crs, placed.middle_deg))

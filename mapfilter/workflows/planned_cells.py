@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from mapfilter.config.inputs import Cells
 from mapfilter.config.sections import Config
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import short_crs
+from mapfilter.geodesy import projected_crs, short_crs, unproject, utm_crs_of
 from mapfilter.lattice import Lattice
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
@@ -15,6 +17,9 @@ from mapfilter.radio.msi import read_antennas
 from mapfilter.radio.plan_files import read_cell_plan
 
 _DEFAULTS = ("height_m", "eirp_dbm", "frequency_mhz")
+_WORLD, _WIDEST_FRAME_M = "+proj=merc +datum=WGS84 +units=m +type=crs", 500_000.0
+"""A projected CRS of the whole earth without an area of use, and how far from its origin a frame of
+one's own reaches: no land with cells is so near to latitude and longitude 0."""
 
 
 def own_layout(cells: Cells) -> bool:
@@ -74,6 +79,32 @@ def cells_beside_log(config: Config, crs: str) -> CellPlan:
             for one in error.faults
         )
         raise InputError(tuple(faults)) from error
+
+
+def cells_of_unplaced_logs(config: Config, frame: str) -> CellPlan:
+    """Read the cell plan of a configuration in the CRS for logs without positions.
+
+    That is the one of the configuration's area, else the UTM zone of the cells.
+
+    Parameters
+    ----------
+    config : Config
+        With a cell plan.
+    frame : str
+        Local frame of the logs, in which cells stay whose metres are in a frame of their own.
+
+    Raises
+    ------
+    InputError
+        As of :func:`planned_cells`.
+    """
+    if config.area.crs is not None:
+        return planned_cells(config, projected_crs(config.area.crs, "area.crs"))
+    cells = planned_cells(config, _WORLD).cells
+    east_m, north_m = np.array([(cell.east_m, cell.north_m) for cell in cells]).T
+    if np.hypot(np.median(east_m), np.median(north_m)) < _WIDEST_FRAME_M:
+        return planned_cells(config, frame)
+    return planned_cells(config, utm_crs_of(*unproject(_WORLD, east_m, north_m)))
 
 
 def plan_antennas(config: Config, plan: CellPlan) -> dict[str, MeasuredAntenna]:

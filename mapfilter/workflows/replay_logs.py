@@ -10,13 +10,16 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail, noted
 from mapfilter.lattice import Lattice
 from mapfilter.positioning.kalman.siteless import needs_sites
+from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.kinds import leave_out
+from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.motion_fault import MotionFault
 from mapfilter.tracks.open_log import OpenedLog
 from mapfilter.tracks.refused_motion import AS_HEADING, note_refused
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.sensors import MOTION_TABLES
 from mapfilter.workflows.logs import journeys_of, open_journey
+from mapfilter.workflows.planned_cells import cells_of_unplaced_logs
 from mapfilter.workflows.replay_lacks import check_log
 
 _MOST_KEPT_ROWS = 1_000_000
@@ -35,20 +38,29 @@ class ReplayLogs:
     def __init__(self, config: Config, database: RadioRouteDatabase | None) -> None:
         self.config, self.paths = config, journeys_of(config)
         self._area = None if database is None else database.lattice
+        self._sites: CellPlan | None = None
         self._kept: dict[Path, OpenedLog] = {}
         self._left_rows = _MOST_KEPT_ROWS
 
     def open(self, path: Path) -> OpenedLog:
-        """Return a log in the database's frame: one that is kept, or read again."""
+        """Return a log in the frame of the database, or of the cells: kept, or read again."""
         if path in self._kept:
             return self._kept[path]
         opened = open_journey(self.config, path, self._area)
+        if self._area is None and self.config.cells.plan is not None and _is_unplaced(opened.log):
+            opened = open_journey(self.config, path, sites=self._sites_beside(opened.log.crs))
         tables = [getattr(opened.log, table) for table in TABLES]
         rows = sum(map(len, (*tables, *opened.sensors.values())))
         if opened.recordings or rows <= self._left_rows:
             self._kept[path] = opened
             self._left_rows -= rows
         return opened
+
+    def _sites_beside(self, frame: str) -> CellPlan:
+        """Return the cells of the configuration, by whose places logs without any are turned."""
+        if self._sites is None:
+            self._sites = cells_of_unplaced_logs(self.config, frame)
+        return self._sites
 
     def check(self, lattice: Lattice | None) -> None:
         """Read every log before any is located, so that all faults come before any result.
@@ -72,7 +84,9 @@ class ReplayLogs:
             except ConfigError:
                 raise
             except MapfilterError as error:
-                faults.take(error)
+                # Those of the cell plan are the same for every log.
+                if any(one not in faults.found for one in error.faults):
+                    faults.take(error)
             else:
                 faults.notes += opened.log.notes if len(faults.found) > before else ()
         faults.raise_if_any(InputError)
@@ -108,3 +122,8 @@ class ReplayLogs:
                     "take the sites of its cells from there, or from a database (--db)"
                 )
                 raise fail(ConfigError, "cells.plan", "a cell plan", "none", hint)
+
+
+def _is_unplaced(log: TrackLog) -> bool:
+    """Return whether a log has no positions by which its place is known."""
+    return bool(log.truth.empty and log.gnss.empty)
