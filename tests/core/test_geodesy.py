@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mapfilter import geodesy
 from mapfilter._area_scale import check_scale
 from mapfilter.errors import InputError
 from mapfilter.geodesy import (
@@ -203,6 +204,16 @@ def test_a_system_without_a_number_keeps_its_text():
 def test_systems_of_other_axis_order_are_taken():
     assert projected_crs("EPSG:2193") == "EPSG:2193"
     assert projected_crs("EPSG:31467") == "EPSG:31467"
+
+
+def test_the_text_of_a_system_is_found_once_and_each_fault_is_told_where_it_is(monkeypatch):
+    local = "+proj=tmerc +lat_0=-41.3 +lon_0=174.7 +datum=WGS84 +units=m"
+    for where in ("a.csv, crs", "b.csv, crs"):
+        with pytest.raises(InputError, match=f"^{where}: expected a projected CRS in metres"):
+            projected_crs("EPSG:4326", where)
+    text = projected_crs(local)
+    monkeypatch.setattr(geodesy, "known_crs", None)
+    assert projected_crs(local) == text
     # always_xy: east comes first whatever the register says.
     east, north = project("EPSG:2193", 174.78, -41.29)
     assert (round(float(east), -5), round(float(north), -5)) == (1.7e6, 5.4e6)

@@ -10,7 +10,7 @@ LENGTH_M = 500.0
 _SECTORS = np.arange(6) * 2.1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class OtherTown(Town):
     """A town that differs from another one in its radio.
 
@@ -60,7 +60,7 @@ def without_streets(east, north):
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class OffWays(Town):
     """A town whose walkers leave the streets half way, and go straight on for 120 m."""
 

@@ -5,6 +5,7 @@ their prediction they wander along the way as a sum of sines does: no process of
 """
 
 from dataclasses import dataclass, replace
+from functools import cache, lru_cache
 
 import numpy as np
 import pandas as pd
@@ -17,10 +18,11 @@ from mapfilter.tracks.log import make_log
 
 CRS, PIXEL_M, SIDE_M = "EPSG:32629", 5.0, 900.0
 WEST_M, SOUTH_M, FLOOR_DBM, STEP_M = 500_000.0, 4_500_000.0, -115.0, 5.0
-NAMES = tuple("ABCDEF")
+NAMES, TABLES = tuple("ABCDEF"), ("motion", "radio", "truth")
 
 
-@dataclass(frozen=True)
+# Towns are the same by identity, as arrays have no hash.
+@dataclass(frozen=True, eq=False)
 class Town:
     """Streets by the coordinates that they run along, and cells by their places."""
 
@@ -30,6 +32,7 @@ class Town:
     slope: float = 35.0
 
     @classmethod
+    @cache
     def of(cls, seed, slope=35.0):
         """Return a town; others have other streets and cells of the same names."""
         rng = np.random.default_rng(seed)
@@ -93,7 +96,16 @@ class Town:
 
 
 def walk_log(town, seed, length_m=1200.0, *, turned_rad=0.0, levels=True, error_db=6.0):
-    """Return a log of a walk: headings of 6°, a bias of 5°, levels that err along the way."""
+    """Return a log of a walk: headings of 6°, a bias of 5°, levels that err along the way.
+
+    Many tests take the same walks; each has tables of its own.
+    """
+    log = _walked(town, seed, length_m, turned_rad, levels, error_db)
+    return replace(log, **{name: getattr(log, name).copy() for name in TABLES})
+
+
+@lru_cache(128)
+def _walked(town, seed, length_m, turned_rad, levels, error_db):
     rng = np.random.default_rng(seed)
     place_m = town.walk(length_m, rng)
     moved = np.diff(place_m, axis=0)
@@ -121,6 +133,6 @@ def walk_log(town, seed, length_m=1200.0, *, turned_rad=0.0, levels=True, error_
 
 def slowed(log, times=4.0):
     """Return a walk at a fraction of its 5 m/s, which are no walker's speed."""
-    tables = {name: getattr(log, name) for name in ("motion", "radio", "truth")}
+    tables = {name: getattr(log, name) for name in TABLES}
     slow = {name: rows.assign(time_s=times * rows["time_s"]) for name, rows in tables.items()}
     return replace(log, **slow)

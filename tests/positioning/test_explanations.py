@@ -32,7 +32,7 @@ EVERYWHERE_M = 1e9
 OPTIONS = BayesFilter(max_particles=2000, min_search_particles=1500, min_particles=500)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LteTown(Town):
     """A town whose cells take turns on some carriers."""
 

@@ -109,7 +109,7 @@ def test_readings_that_a_program_repeats_are_left_out(written):
 
 
 def test_of_several_network_codes_of_a_cell_the_commonest_is_taken(written):
-    """Of 24 405 in rows 1 to 4, none in row 5, and 24 491 after; a cell of its own has one code."""
+    """Rows 1 to 4 have 244-05, row 5 none, and others 244-91; another cell has one code alone."""
     head, *rows = gnettrack().splitlines()
     for i in (1, 2, 3, 4, 20):
         rows[i] = rows[i].replace("\t24491\t", "\t24405\t")
