@@ -160,6 +160,14 @@ def test_times_that_jump_years_are_left_out(written):
     assert "time_s: missing, or no number" in reasons
 
 
+def test_a_row_with_several_cells_goes_backwards_once(written):
+    """Its cells are added one by one: the serving one, then each neighbour."""
+    head, *rows = MADE["gnettrack"][1].splitlines()
+    rows[10], rows[11] = rows[11], rows[10]
+    notes = read_recording(written("gnettrack", "\n".join([head, *rows]))).notes
+    assert "radio: times go backwards in 1 place; sorted" in notes
+
+
 def test_duplicate_epochs_and_times_going_backwards(written):
     head, *rows = MADE["opencellid"][1].splitlines()
     text = "\n".join([head, *rows[:10], rows[9], rows[12], rows[11], rows[10], *rows[13:]])

@@ -78,6 +78,7 @@ class Reading(Remarks):
     ending: Callable[[pd.DataFrame], None] | None = None
     counted: CountedNotes = field(default_factory=CountedNotes)
     _firsts: dict[str, str] = field(default_factory=dict)
+    _backwards: dict[str, Ints] = field(default_factory=dict)
     _refused: dict[str, list[Ints]] = field(default_factory=dict)
 
     def refuse(self, lines: ArrayLike, reason: str, first: float | None = None) -> None:
@@ -119,15 +120,30 @@ class Reading(Remarks):
         if not good.all():
             checked = {name: values[good] for name, values in checked.items()}
         rows = pd.DataFrame(checked, copy=False)
-        steps_s = np.diff(rows["time_s"].to_numpy()) if "time_s" in rows else np.zeros(0)
-        if back := int(np.sum(steps_s < 0)):
-            cause = set_back_by(-steps_s[steps_s < 0], self.clock)
+        if "time_s" in rows:
+            self._note_backwards(table, rows["time_s"].to_numpy(), line[good])
+        self.tables.setdefault(table, []).append(rows)
+
+    def _note_backwards(self, table: str, time_s: Floats, line: Ints) -> None:
+        """Note where times go backwards; of a line with several rows of a table once."""
+        steps_s = np.diff(time_s)
+        back = steps_s < 0
+        if not back.any():
+            return
+        known = self._backwards.get(table, np.zeros(0, dtype=np.int64))
+        before, after = (
+            np.searchsorted(known, ends[back], "right") for ends in (line[:-1], line[1:])
+        )
+        # A cell that is not in all lines goes backwards from one of its lines to the next.
+        new = np.count_nonzero(before == after)
+        self._backwards[table] = np.union1d(known, line[1:][back])
+        if new:
+            cause = set_back_by(-steps_s[back], self.clock)
             why = f" (likely: {cause})" if cause else ""
             self.count(
                 lambda n: f"{table}: times go backwards in {number_of(n, 'place')}; sorted{why}",
-                back,
+                new,
             )
-        self.tables.setdefault(table, []).append(rows)
 
     def shift(self, later_s: float) -> None:
         """Make the times of all rows so far later."""
