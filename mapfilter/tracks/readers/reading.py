@@ -135,7 +135,7 @@ class Reading(Remarks):
             np.searchsorted(known, ends[back], "right") for ends in (line[:-1], line[1:])
         )
         # A cell that is not in all lines goes backwards from one of its lines to the next.
-        new = np.count_nonzero(before == after)
+        new = int(np.count_nonzero(before == after))
         self._backwards[table] = np.union1d(known, line[1:][back])
         if new:
             cause = set_back_by(-steps_s[back], self.clock)
