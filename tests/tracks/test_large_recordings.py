@@ -83,6 +83,12 @@ REMARKS = {
         speed_mps=3.0,
     ),
     "400 values of W by column ew": table(**PLACED, ew="W"),
+    "80 values are not 0..65535 as in GSM, ignored (first in line 2)": table(
+        **PLACED,
+        level_dbm=-80.0,
+        technology="GSM",
+        mcc=244, mnc=91, lac=7, ci=np.where(ORDER % 5, 100 + ORDER % 3, 70_000),
+    ),
 }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -70,6 +71,11 @@ def cell_names(mcc: Floats, mnc: Floats, lac: Floats, ci: Floats) -> np.ndarray:
     return names[codes]
 
 
+def _beyond(label: str, limit: str, line: int, count: int) -> str:
+    some = number_of(count, "value is", "values are")
+    return f"{label}: {some} not {limit}, ignored (first in line {line})"
+
+
 def add_radio(reading: Reading, columns: Mapping[str, Any], lines: ArrayLike) -> None:
     """Add reported cells, with names of those identified, and codes checked by technology.
 
@@ -90,10 +96,12 @@ def add_radio(reading: Reading, columns: Mapping[str, Any], lines: ArrayLike) ->
         for name, most in limits.items():
             bad = of & ~np.isnan(given[name]) & ~((given[name] >= 0) & (given[name] <= most))
             if bad.any():
-                some = number_of(int(bad.sum()), "value is", "values are")
-                reading.ignore(
-                    f"radio, {name}: {some} not 0..{most} as in {family}, "
-                    f"ignored (first in line {line[bad][0]})"
+                limit = f"0..{most} as in {family}"
+                reading.count(
+                    partial(_beyond, f"radio, {name}", limit, line[bad][0]),
+                    int(bad.sum()),
+                    key=f"radio, {name}: {limit}",
+                    ignored=True,
                 )
                 given[name] = np.where(bad, np.nan, given[name])
     if "cell" not in given:
