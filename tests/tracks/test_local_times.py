@@ -146,3 +146,30 @@ def test_slow_rows_are_read_as_they_are(tmp_path, header, each, turning):
     columns = {"time": header} if header == "seconds" else {}
     log = mf.read_log(tmp_path / "drive.csv", columns=columns)
     assert log.duration_s == pytest.approx(299 * each * (0.001 if header == "time_ms" else 1))
+
+
+def seldom(**more):
+    """Rows of a vehicle's unit, 15 apart."""
+    counts = np.arange(300)
+    rows = {"time": 15 * counts, "cell": "A", "level_dbm": -80.0 - counts % 5}
+    return pd.DataFrame(rows | {"acc_x": np.cos(counts)} | more)
+
+
+def test_seconds_by_which_positions_move_as_on_a_journey_are_seconds(tmp_path):
+    """15 m from row to row: 1 m/s, or 1 km/s if they were milliseconds."""
+    rows = seldom(lat=60.17 + 15 / 111_200 * np.arange(300), lon=24.94)
+    rows.to_csv(tmp_path / "drive.csv", index=False)
+    assert mf.read_log(tmp_path / "drive.csv").gnss["time_s"].iloc[-1] == 15 * 299
+    # 15 mm from row to row: 1 m/s if they are milliseconds.
+    rows = seldom(lat=60.17 + 0.015 / 111_200 * np.arange(300), lon=24.94)
+    rows.to_csv(tmp_path / "drive.csv", index=False)
+    with pytest.raises(InputError, match="time_ms for milliseconds"):
+        mf.read_log(tmp_path / "drive.csv")
+
+
+def test_times_of_day_in_one_number_are_no_milliseconds(tmp_path):
+    of_day = np.arange(43_200, 43_200 + 15 * 300, 15)
+    digits = 10_000 * (of_day // 3600) + 100 * (of_day // 60 % 60) + of_day % 60
+    seldom(time=digits).to_csv(tmp_path / "drive.csv", index=False)
+    log = mf.read_log(tmp_path / "drive.csv")
+    assert np.ptp(log.radio["time_s"]) == 15 * 299

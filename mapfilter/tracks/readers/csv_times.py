@@ -55,6 +55,8 @@ _DAYS = "time: days since 1900, as a spreadsheet writes them"
 _OF_SENSORS = ("yaw_rate_radps", "yaw_rate_degps", "gyr_z", "acc_x")
 _SELDOM_S, _FEWEST_SELDOM = 10.0, 20
 """Seconds between rows in which no sensor follows turns or steps, and the fewest such rows."""
+_SLOWEST_MPS, _DEGREE_M = 0.1, 111_200.0
+"""Mean speed of a journey; in thousandths of a second a train has less. Metres of a degree."""
 
 
 def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
@@ -84,7 +86,8 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
             counted_s = utc_from_week_s(weeks_of(mapped.rows, week, reading), number)
             return over_stuck_weeks(reading, counted_s, week)
         number = _without_digits(reading, number)
-        _check_milliseconds(mapped, reading, number[np.isfinite(number)])
+        if _OF_DAY not in reading.notes:
+            _check_milliseconds(mapped, reading, number)
         reading.clock = Clock("monotonic", from_midnight=_OF_DAY in reading.notes)
         return over_days(reading, over_weeks(reading, number))
     reading.notes[:] = [
@@ -171,8 +174,10 @@ def _without_digits(reading: Reading, number: Floats) -> Floats:
     return counted
 
 
-def _check_milliseconds(mapped: Mapped, reading: Reading, known: Floats) -> None:
+def _check_milliseconds(mapped: Mapped, reading: Reading, number: Floats) -> None:
     """Refuse whole numbers without a unit by which turns or accelerations came very seldom.
+
+    They are seconds where positions move by them as on a journey.
 
     Raises
     ------
@@ -180,16 +185,30 @@ def _check_milliseconds(mapped: Mapped, reading: Reading, known: Floats) -> None
         Naming the column of times.
     """
     column = mapped.rows.find(*mapped.names("time")) or ""
+    known = number[np.isfinite(number)]
     if mapped.unit("time") is not None or "sec" in column or known.size < _FEWEST_SELDOM:
         return
     between_s = float(np.median(np.diff(np.unique(known)))) if np.ptp(known) else 0.0
     if between_s < _SELDOM_S or (known != np.round(known)).any():
         return
-    if any(map(mapped.holds, _OF_SENSORS)):
+    if any(map(mapped.holds, _OF_SENSORS)) and not _mean_mps(mapped, number) > _SLOWEST_MPS:
         got = f"whole numbers, {between_s:g} from row to row"
         hint = "milliseconds for s; call the column time_ms for milliseconds, time_s for seconds"
         expected = "seconds, and rows of a sensor that follow each other"
         raise fail(InputError, f"{reading.path}, time ({column})", expected, got, hint)
+
+
+def _mean_mps(mapped: Mapped, time_s: Floats) -> float:
+    """Return the mean speed of a file's positions if its times are seconds; 0 without any."""
+    if not mapped.has("lat_deg", "lon_deg"):
+        return 0.0
+    lat_deg, lon_deg = mapped.number("lat_deg"), mapped.number("lon_deg")
+    known = np.isfinite(lat_deg) & np.isfinite(lon_deg) & np.isfinite(time_s)
+    if not known.any() or not np.ptp(time_s[known]):
+        return 0.0
+    east_deg = np.diff(lon_deg[known]) * np.cos(np.radians(lat_deg[known][1:]))
+    way_m = _DEGREE_M * np.hypot(east_deg, np.diff(lat_deg[known])).sum()
+    return float(way_m / np.ptp(time_s[known]))
 
 
 def _check_digits(mapped: Mapped, reading: Reading, known: Floats) -> None:
