@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapfilter._device import open_device
+from mapfilter.angles import wrap_rad
 from mapfilter.database.store import open_database
 from mapfilter.errors import MapfilterError
-from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import GridFilter
 from mapfilter.positioning.estimate import TrackEstimate

@@ -18,10 +18,10 @@ import pandas as pd
 import rasterio
 from scipy.ndimage import label
 
+from mapfilter.angles import wrap_rad
 from mapfilter.database.build import build_roads
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.sources import LayerRoutes
-from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.filter import Filter
 from mapfilter.positioning.loop import locate

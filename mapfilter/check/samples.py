@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapfilter._types import Floats, Floats32
-from mapfilter.geodesy import azimuth_from_heading_deg, grid_convergence_rad, unproject
+from mapfilter.angles import azimuth_from_heading_deg
+from mapfilter.geodesy import grid_convergence_rad, unproject
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell
 from mapfilter.rasters.raster_set import RxLevRasters

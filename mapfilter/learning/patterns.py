@@ -16,7 +16,8 @@ from functools import cached_property
 import numpy as np
 
 from mapfilter._types import Floats, Ints
-from mapfilter.geodesy import grid_convergence_rad, heading_from_azimuth_rad, unproject
+from mapfilter.angles import heading_from_azimuth_rad
+from mapfilter.geodesy import grid_convergence_rad, unproject
 from mapfilter.learning.calibration import NEAREST_M
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.cells import Cell, CellPlan

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapfilter._types import Floats
-from mapfilter.geodesy import wrap_rad
+from mapfilter.angles import wrap_rad
 from mapfilter.learning.tracks import JourneyTrack
 from mapfilter.tracks.log import TrackLog
 

@@ -24,7 +24,7 @@ from numba import njit
 from mapfilter._kernels import cos_sin32, exp32, hashed, normals, uniforms, wrap32
 from mapfilter._threads import ONE, Call
 from mapfilter._types import Floats32
-from mapfilter.geodesy import wrap_rad
+from mapfilter.angles import wrap_rad
 from mapfilter.options import NotNegative, Options, Positive, Radians, Share
 
 EAST, NORTH, BIAS, LOG_SCALE, OFF, TURN, STRETCH, RATE = range(8)

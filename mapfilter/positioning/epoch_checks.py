@@ -22,7 +22,7 @@ _SPREAD = Column("spread_m", 0, inf, "metres >= 0")
 _TURNED = Column("turned_sd_rad", 0, 1e6, "radians >= 0")
 _OF_HEADINGS = (
     "degrees given for radians, or headings that count on beyond a turn; "
-    "mapfilter.geodesy.wrap_one_rad wraps one"
+    "mapfilter.angles.wrap_one_rad wraps one"
 )
 _ROLES = (SERVING, NEIGHBOUR)
 _FIELDS: dict[type, dict[str, Column]] = {

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mapfilter._types import Bools, Floats, Floats32
-from mapfilter.geodesy import grid_convergence_rad, heading_from_azimuth_rad, unproject
+from mapfilter.angles import heading_from_azimuth_rad
+from mapfilter.geodesy import grid_convergence_rad, unproject
 from mapfilter.lattice import Lattice
 from mapfilter.propagation.line_of_sight import (
     check_heights,

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats
+from mapfilter.angles import wrap_rad
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import wrap_rad
 
 _SIDE_LOBE_DB = 20.0
 

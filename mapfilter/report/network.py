@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, find_objects
 
 from mapfilter._types import Floats
+from mapfilter.angles import heading_from_azimuth_rad
 from mapfilter.errors import InputError
-from mapfilter.geodesy import grid_convergence_rad, heading_from_azimuth_rad, unproject
+from mapfilter.geodesy import grid_convergence_rad, unproject
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.report.basemap import (

@@ -9,8 +9,8 @@ from typing import Any
 import pandas as pd
 
 from mapfilter._inputs import shown
+from mapfilter.angles import wrap_rad
 from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.merging import epoch_columns, make_epoch
 from mapfilter.positioning.sensors.pace import Pace

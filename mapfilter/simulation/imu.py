@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats
-from mapfilter.geodesy import wrap_rad
+from mapfilter.angles import wrap_rad
 from mapfilter.tracks.deadreckoning import noisy_steps, steps_between
 from mapfilter.tracks.imu_noise import ImuNoise
 

@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats
+from mapfilter.angles import wrap_rad
 from mapfilter.errors import Faults
-from mapfilter.geodesy import wrap_rad
 from mapfilter.options import Options, Positive
 from mapfilter.simulation.routes import Route
 from mapfilter.simulation.walking import Inside, WalkerModel, path_beside, with_stops

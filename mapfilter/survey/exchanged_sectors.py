@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapfilter._types import Floats
-from mapfilter.geodesy import wrap_rad
+from mapfilter.angles import wrap_rad
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.survey.level_trend import (

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._words import number_of
+from mapfilter.angles import heading_from_azimuth_rad
 from mapfilter.errors import InputError, MapfilterError, fail
-from mapfilter.geodesy import heading_from_azimuth_rad
 from mapfilter.tracks.alignment import Alignment, align
 from mapfilter.tracks.beyond_crs import within_crs
 from mapfilter.tracks.equal_times import in_order

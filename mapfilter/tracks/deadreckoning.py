@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats
-from mapfilter.geodesy import wrap_rad
+from mapfilter.angles import wrap_rad
 
 TranslationNoise = Literal["zero_mean", "as_printed"]
 

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats
+from mapfilter.angles import wrap_rad
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.pdr.step_counts import are_own_counts
 from mapfilter.tracks.pdr.turns import Turning
 from mapfilter.tracks.readers.recording import Recording

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from mapfilter.angles import wrap_rad
 from mapfilter.errors import InputError, fail, listed
-from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.drive import drive_of, own_turning
 from mapfilter.tracks.exchanged import check_columns
 from mapfilter.tracks.frame import Frame

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats
-from mapfilter.geodesy import heading_from_azimuth_rad
+from mapfilter.angles import heading_from_azimuth_rad
 from mapfilter.tracks.headings import headings_and_courses
 from mapfilter.tracks.journey_motion import Moved
 from mapfilter.tracks.misplaced import UNDONE

@@ -8,8 +8,8 @@ from math import isfinite
 import numpy as np
 import pandas as pd
 
+from mapfilter.angles import wrap_rad
 from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.motion_fault import MOTION_COLUMNS, fault_notes
 from mapfilter.tracks.schema import TABLES

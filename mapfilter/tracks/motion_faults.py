@@ -13,7 +13,7 @@ import pandas as pd
 
 from mapfilter._constants import FOOT_M, KMH_MPS, KNOT_MPS, MPH_MPS
 from mapfilter._types import Bools, Complexes, Floats
-from mapfilter.geodesy import wrap_rad
+from mapfilter.angles import wrap_rad
 from mapfilter.tracks.headings import heading_fault
 from mapfilter.tracks.motion_fault import MotionFault
 from mapfilter.tracks.second_deliveries import once_each

@@ -7,7 +7,7 @@ import pandas as pd
 
 from mapfilter._constants import MAD_TO_SD
 from mapfilter._types import Bools, Floats
-from mapfilter.geodesy import heading_from_azimuth_rad, wrap_rad
+from mapfilter.angles import heading_from_azimuth_rad, wrap_rad
 from mapfilter.tracks.imu_noise import ImuNoise
 
 _LONGEST_S = 5.0

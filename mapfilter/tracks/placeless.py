@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 from pyproj import CRS
 
-from mapfilter.geodesy import grid_convergence_rad, short_crs, wrap_rad
+from mapfilter.angles import wrap_rad
+from mapfilter.geodesy import grid_convergence_rad, short_crs
 from mapfilter.tracks.log import TrackLog
 
 LOCAL_FRAME = "a local frame"

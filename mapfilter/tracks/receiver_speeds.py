@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats
+from mapfilter.angles import heading_from_azimuth_rad
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import heading_from_azimuth_rad
 from mapfilter.tracks.headings import headings_and_courses
 from mapfilter.tracks.motion_fault import MotionFault
 from mapfilter.tracks.motion_faults import step_fault

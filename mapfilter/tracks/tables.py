@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools
 from mapfilter._words import number_of
+from mapfilter.angles import wrap_rad
 from mapfilter.errors import Faults, listed
-from mapfilter.geodesy import wrap_rad
 from mapfilter.radio.identities import LIMITS, technology
 from mapfilter.tracks.column_values import TableFaults, column_values, note_values
 from mapfilter.tracks.cut_times import cut_times

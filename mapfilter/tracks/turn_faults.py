@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Bools, Floats, Ints
-from mapfilter.geodesy import wrap_rad
+from mapfilter.angles import wrap_rad
 from mapfilter.tracks.motion_fault import MotionFault
 from mapfilter.tracks.stretches import (
     Stretches,

@@ -7,19 +7,21 @@ from hypothesis import strategies as st
 
 from mapfilter import geodesy
 from mapfilter._area_scale import check_scale
+from mapfilter.angles import (
+    azimuth_from_heading_deg,
+    heading_from_azimuth_rad,
+    wrap_one_rad,
+    wrap_rad,
+)
 from mapfilter.errors import InputError
 from mapfilter.geodesy import (
-    azimuth_from_heading_deg,
     check_bbox,
     grid_convergence_rad,
-    heading_from_azimuth_rad,
     project,
     projected_crs,
     same_crs,
     unproject,
     utm_crs,
-    wrap_one_rad,
-    wrap_rad,
 )
 
 ANGLES = st.floats(-1e4, 1e4)

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from belief_events import Event, run
 
+from mapfilter.angles import wrap_rad
 from mapfilter.database.nearest import CellPointIndex
 from mapfilter.filters.candidate import CandidateOptions, CandidateSearch
 from mapfilter.filters.contract import (
@@ -27,7 +28,6 @@ from mapfilter.filters.contract import (
     Status,
     UpdateInfo,
 )
-from mapfilter.geodesy import wrap_rad
 from mapfilter.lattice import Lattice
 
 LATTICE = Lattice("EPSG:32629", 5_000.0, 8_000.0, 5.0, 60, 70)

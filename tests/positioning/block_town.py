@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import shapely
 
-from mapfilter.geodesy import wrap_rad
+from mapfilter.angles import wrap_rad
 from mapfilter.lattice import Lattice
 from mapfilter.roads.ways import Ways
 from mapfilter.tracks.log import make_log

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mapfilter.angles import wrap_rad
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.gaussian import EKF, UKF
-from mapfilter.geodesy import wrap_rad
 from mapfilter.models.state import StateLayout
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.kalman.alignment import Alignment, Direction

@@ -11,10 +11,10 @@ from block_town import CRS, LATTICE, as_log, drive, make_town, odometry, wander
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mapfilter.angles import wrap_rad
 from mapfilter.database.build import build_roads
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.filters.contract import MotionStep, Reason, Status
-from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.options import VEHICLE, BayesFilter
 from mapfilter.positioning.bayes.path import LEG_M, PATH_M, RecentPath

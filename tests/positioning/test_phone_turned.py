@@ -9,9 +9,9 @@ import pytest
 from made_town import Town, walk_log
 from true_places import error_m
 
+from mapfilter.angles import wrap_rad
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.particle import UpdateInfo
-from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.bayes import own_draws
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
 from mapfilter.positioning.bayes.certainty import Recovery

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from mapfilter.angles import wrap_rad
 from mapfilter.filters.contract import MotionStep, Reason, Status
-from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.gnss.wander import WanderFix
 from mapfilter.positioning.kalman.filter import KalmanFilter

@@ -6,9 +6,9 @@ from math import degrees, hypot, inf, nan, radians
 import numpy as np
 import pytest
 
+from mapfilter.angles import wrap_rad
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.gaussian import EKF, UKF, Gaussian
-from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.kalman.alignment import Alignment
 from mapfilter.positioning.kalman.filter import KalmanTracker

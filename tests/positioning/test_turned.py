@@ -6,9 +6,9 @@ from math import degrees, nan, radians
 import numpy as np
 import pytest
 
+from mapfilter.angles import wrap_rad
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.gaussian import EKF, UKF
-from mapfilter.geodesy import wrap_rad
 from mapfilter.models.state import StateLayout
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.kalman.alignment import Alignment

@@ -8,10 +8,10 @@ import pytest
 from made_town import Town, walk_log
 from true_places import error_m
 
+from mapfilter.angles import wrap_rad
 from mapfilter.filters.contract import Status
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.geodesy import wrap_rad
 from mapfilter.models.street_motion import BIAS, STATES
 from mapfilter.positioning.bayes.belief_changes import turned_at_jump
 from mapfilter.positioning.bayes.hold_rules import HoldRules

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mapfilter.angles import heading_from_azimuth_rad
 from mapfilter.check.lobes import (
     azimuth_mistakes,
     best_labels,
@@ -11,7 +12,6 @@ from mapfilter.check.lobes import (
 from mapfilter.check.place_fits import peak_m
 from mapfilter.check.raster_kinds import above_free_space_db, falls_with_distance
 from mapfilter.check.samples import RasterSample
-from mapfilter.geodesy import heading_from_azimuth_rad
 from mapfilter.lattice import Lattice
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import simulate_ground_truth

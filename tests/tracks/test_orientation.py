@@ -6,8 +6,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import mapfilter as mf
+from mapfilter.angles import wrap_rad
 from mapfilter.errors import InputError
-from mapfilter.geodesy import wrap_rad
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.pdr.orientation import compass_of_orientation, turning_of_orientation
 from mapfilter.tracks.readers.formats import read_recording

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mapfilter.geodesy import wrap_rad
+from mapfilter.angles import wrap_rad
 from mapfilter.tracks.moved import course_errors, motion_from_course
 from mapfilter.tracks.pdr.vehicle import reckon_velocity
 from mapfilter.tracks.position_motion import motion_from_positions

@@ -6,8 +6,9 @@ import pytest
 from made_recordings import MADE
 
 import mapfilter as mf
+from mapfilter.angles import azimuth_from_heading_deg
 from mapfilter.errors import InputError
-from mapfilter.geodesy import azimuth_from_heading_deg, unproject
+from mapfilter.geodesy import unproject
 from mapfilter.tracks.readers import text
 from mapfilter.tracks.readers.formats import read_recording
 

@@ -8,7 +8,8 @@ import pytest
 from command_line import ONE, assert_done, assert_refused, mapfilter, settings
 from conftest import IDENTITIES
 
-from mapfilter.geodesy import azimuth_from_heading_deg, unproject
+from mapfilter.angles import azimuth_from_heading_deg
+from mapfilter.geodesy import unproject
 from mapfilter.tracks.store import read_log
 
 START_UTC_S = 1_777_629_600

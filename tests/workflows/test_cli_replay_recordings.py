@@ -11,7 +11,8 @@ from command_line import ONE, assert_done, assert_refused, mapfilter, settings
 from conftest import IDENTITIES
 from made_recordings import MADE
 
-from mapfilter.geodesy import azimuth_from_heading_deg, unproject
+from mapfilter.angles import azimuth_from_heading_deg
+from mapfilter.geodesy import unproject
 from mapfilter.positioning.estimate_store import read_estimate
 from mapfilter.tracks.store import read_log, write_log
 

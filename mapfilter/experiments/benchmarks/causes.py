@@ -9,11 +9,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mapfilter._types import Bools, Floats
+from mapfilter.angles import wrap_rad
 from mapfilter.evaluation.accuracy import position_errors_m
 from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.benchmarks.worst_run import WorstEpoch
 from mapfilter.filters.contract import Reason
-from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.sensors.watch import UNMEASURED
 

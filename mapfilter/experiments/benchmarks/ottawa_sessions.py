@@ -16,8 +16,9 @@ import pandas as pd
 
 from mapfilter._inputs import open_input
 from mapfilter._types import Floats
+from mapfilter.angles import heading_from_azimuth_rad
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import grid_convergence_rad, heading_from_azimuth_rad, project
+from mapfilter.geodesy import grid_convergence_rad, project
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.sampling import sampling_sd_m
 from mapfilter.tracks.schema import SERVING

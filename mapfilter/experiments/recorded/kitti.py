@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats
+from mapfilter.angles import wrap_rad
 from mapfilter.database.build import build_roads
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.errors import InputError, fail
@@ -24,7 +25,6 @@ from mapfilter.experiments.recorded.locating import OpenMap, locate_log
 from mapfilter.experiments.recorded.oracles import NOISE, START, motion_errors, with_start
 from mapfilter.experiments.recorded.rows import Found
 from mapfilter.experiments.recorded.scoring import score_journey
-from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.roads.raster import raster_lattice, read_raster_ways

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from mapfilter.angles import wrap_rad
 from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.truth import Truth
 from mapfilter.experiments.recorded.benchmark import Benchmark, Journey, Judged, Task
@@ -31,7 +32,6 @@ from mapfilter.experiments.recorded.outages import (
     log_without,
 )
 from mapfilter.experiments.recorded.scoring import score_journey
-from mapfilter.geodesy import wrap_rad
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import open_log

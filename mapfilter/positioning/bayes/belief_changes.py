@@ -7,10 +7,10 @@ from math import radians, sqrt
 
 import numpy as np
 
+from mapfilter.angles import wrap_one_rad, wrap_rad
 from mapfilter.filters.contract import Status
 from mapfilter.filters.grid import GridBelief
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.geodesy import wrap_one_rad, wrap_rad
 from mapfilter.models.street_motion import BIAS, NORTH, MotionErrors
 from mapfilter.models.street_motion import remounted as remounted_states
 from mapfilter.positioning.bayes.alternative import MapBelief

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from math import radians
 
-from mapfilter.geodesy import wrap_one_rad
+from mapfilter.angles import wrap_one_rad
 from mapfilter.positioning.bayes.alternative import AlternativeHypothesis
 from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.state import BayesState

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mapfilter._types import Floats, Floats32
+from mapfilter.angles import wrap_rad
 from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.resampling import systematic
-from mapfilter.geodesy import wrap_rad
 from mapfilter.models.street_motion import (
     BIAS,
     EAST,

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from mapfilter._device import PROCESSOR, Device, arrays_of
 from mapfilter._types import Floats, Floats32
+from mapfilter.angles import wrap_rad
 from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import Reason
 from mapfilter.filters.grid_transport import Spread, Transport
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
-from mapfilter.geodesy import wrap_rad
 from mapfilter.models.street_motion import BIAS, EAST, NORTH, OFF, STATES
 from mapfilter.models.way_spread import LEAST_LOG, ways_exponent
 from mapfilter.positioning.bayes.evidence import RadioReading

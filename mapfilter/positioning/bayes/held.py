@@ -20,11 +20,11 @@ from math import hypot, isfinite, log, nan, radians
 
 import numpy as np
 
+from mapfilter.angles import wrap_one_rad, wrap_rad
 from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.filters.copies import copies_of
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.geodesy import wrap_one_rad, wrap_rad
 from mapfilter.models.street_motion import BIAS, STATES
 from mapfilter.positioning.bayes.alternative import NullHypothesis
 from mapfilter.positioning.bayes.hold import Hold

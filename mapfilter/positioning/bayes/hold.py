@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import isfinite, radians
 
+from mapfilter.angles import wrap_one_rad, wrap_rad
 from mapfilter.filters.contract import MotionStep
-from mapfilter.geodesy import wrap_one_rad, wrap_rad
 
 _USUAL_RAD = radians(30.0)
 

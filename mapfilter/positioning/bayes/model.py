@@ -15,10 +15,10 @@ from math import isfinite, nan
 import numpy as np
 
 from mapfilter._types import Floats, Floats32
+from mapfilter.angles import wrap_rad
 from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
-from mapfilter.geodesy import wrap_rad
 from mapfilter.models.street_motion import BIAS, NORTH, OFF, MotionErrors, move, moving
 from mapfilter.models.way_course import with_courses
 from mapfilter.models.way_map import (

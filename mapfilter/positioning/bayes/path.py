@@ -8,8 +8,8 @@ from math import atan2, ceil, cos, isfinite, pi, radians, sin
 import numpy as np
 
 from mapfilter._types import Floats32
+from mapfilter.angles import wrap_one_rad
 from mapfilter.filters.contract import MotionStep
-from mapfilter.geodesy import wrap_one_rad
 
 LEG_M = 5.0
 """Distance between two points of a path."""

@@ -16,7 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapfilter._types import Bools, Floats, Ints, Ints32
-from mapfilter.geodesy import azimuth_from_heading_deg, grid_convergence_rad, unproject
+from mapfilter.angles import azimuth_from_heading_deg
+from mapfilter.geodesy import grid_convergence_rad, unproject
 from mapfilter.radio.antenna import sector_gain_db
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.identities import TIMING_STEP_M

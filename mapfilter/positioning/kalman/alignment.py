@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from math import atan2, cos, hypot, isfinite, nan, radians, sin, sqrt
 from typing import NamedTuple
 
+from mapfilter.angles import wrap_one_rad
 from mapfilter.filters.contract import MotionStep
-from mapfilter.geodesy import wrap_one_rad
 from mapfilter.positioning.epochs import headed
 
 _LEAST_M, _DEVIATIONS = 30.0, 8.0

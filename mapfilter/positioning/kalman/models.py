@@ -11,9 +11,10 @@ from typing import Annotated
 import numpy as np
 from annotated_types import Ge, Le
 
+from mapfilter.angles import heading_from_azimuth_rad
 from mapfilter.errors import Faults, InputError
 from mapfilter.filters.trials import CompiledMeasurement
-from mapfilter.geodesy import grid_convergence_rad, heading_from_azimuth_rad, unproject
+from mapfilter.geodesy import grid_convergence_rad, unproject
 from mapfilter.models.gaussian import GaussianTerms, stack
 from mapfilter.models.ranging import GSM_STEP_M, timing_advances
 from mapfilter.models.signal_strength import levels, sampled_pattern

@@ -23,8 +23,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mapfilter._types import Floats
+from mapfilter.angles import wrap_rad
 from mapfilter.filters.contract import MotionStep
-from mapfilter.geodesy import wrap_rad
 from mapfilter.positioning.kalman.stretches import (
     LEAST_FIX_SD_M,
     LEAST_ROWS,

@@ -11,8 +11,8 @@ from dataclasses import replace
 from math import atan2, cos, hypot, isfinite, nan, radians, sin
 from typing import NamedTuple
 
+from mapfilter.angles import wrap_one_rad
 from mapfilter.filters.contract import MotionStep
-from mapfilter.geodesy import wrap_one_rad
 from mapfilter.positioning.epochs import Epoch
 
 LEAST_M = 0.5

@@ -25,7 +25,7 @@ import pandas as pd
 from annotated_types import Ge, Gt, Le, Lt
 
 from mapfilter._types import Floats
-from mapfilter.geodesy import wrap_rad
+from mapfilter.angles import wrap_rad
 from mapfilter.options import Below1, NotNegative, Options, Positive, Share
 from mapfilter.simulation.worlds.phone import headings_rad
 from mapfilter.simulation.worlds.sinusoids import gauss_markov

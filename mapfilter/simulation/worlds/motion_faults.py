@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats
-from mapfilter.geodesy import wrap_rad
+from mapfilter.angles import wrap_rad
 from mapfilter.simulation.worlds.windows import Window
 from mapfilter.tracks.log import TrackLog
 

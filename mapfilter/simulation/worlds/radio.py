@@ -31,7 +31,8 @@ import numpy as np
 from annotated_types import Ge, Le
 
 from mapfilter._types import Floats, Floats32, Ints
-from mapfilter.geodesy import grid_convergence_rad, heading_from_azimuth_rad, unproject
+from mapfilter.angles import heading_from_azimuth_rad
+from mapfilter.geodesy import grid_convergence_rad, unproject
 from mapfilter.lattice import Lattice
 from mapfilter.options import NotNegative, Options, Positive, Share
 from mapfilter.propagation.shadowing import named_rng

@@ -11,7 +11,7 @@ import pandas as pd
 from mapfilter._constants import MAD_TO_SD
 from mapfilter._types import Floats
 from mapfilter._words import number_of
-from mapfilter.geodesy import heading_from_azimuth_rad, wrap_rad
+from mapfilter.angles import heading_from_azimuth_rad, wrap_rad
 from mapfilter.tracks.headings import compass_fault
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.pdr.batches import parted, spread

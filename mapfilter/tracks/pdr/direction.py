@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mapfilter._types import Bools, Floats
-from mapfilter.geodesy import wrap_rad
+from mapfilter.angles import wrap_rad
 from mapfilter.tracks.pdr.options import Pose
 from mapfilter.tracks.pdr.signals import RATE_HZ
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapfilter._types import Bools, Floats
-from mapfilter.geodesy import wrap_rad
+from mapfilter.angles import wrap_rad
 from mapfilter.tracks.pdr.gyroscope import RATE_SD_RADPS, UNSEEN_SD_RADPS, WALK_RAD_PER_SQRT_S
 
 _SIZE_SHARE = 0.2

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats
-from mapfilter.geodesy import wrap_rad
+from mapfilter.angles import wrap_rad
 from mapfilter.tracks.pdr.direction import UPRIGHT
 from mapfilter.tracks.pdr.turns import LONGEST_S, ORIENTATION, Turning, samples
 

@@ -10,7 +10,7 @@ import pandas as pd
 
 from mapfilter._types import Floats
 from mapfilter._words import number_of
-from mapfilter.geodesy import wrap_rad
+from mapfilter.angles import wrap_rad
 from mapfilter.tracks.equal_times import joined_times
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.moved import UNDIRECTED, long_gaps, motion_from_odometry, odometry_gaps

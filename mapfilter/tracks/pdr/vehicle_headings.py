@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats
-from mapfilter.geodesy import wrap_rad
+from mapfilter.angles import wrap_rad
 from mapfilter.tracks.equal_times import joined_times
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.moved import motion_from_odometry

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Bools, Floats, Ints
-from mapfilter.geodesy import wrap_rad
+from mapfilter.angles import wrap_rad
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.pdr.attitude import Attitude, attitude
 from mapfilter.tracks.pdr.carried_bias import CarriedBias, bias_while_carried
