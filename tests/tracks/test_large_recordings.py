@@ -87,7 +87,10 @@ REMARKS = {
         **PLACED,
         level_dbm=-80.0,
         technology="GSM",
-        mcc=244, mnc=91, lac=7, ci=np.where(ORDER % 5, 100 + ORDER % 3, 70_000),
+        mcc=244,
+        mnc=91,
+        lac=7,
+        ci=np.where(ORDER % 5, 100 + ORDER % 3, 70_000),
     ),
 }
 
