@@ -12,39 +12,27 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from mapfilter._constants import DAY_S, GPS_EPOCH_S
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.errors import listed
-from mapfilter.tracks.cut_times import cut_times
-from mapfilter.tracks.readers.batched_rows import without_batches
-from mapfilter.tracks.readers.held_positions import own_positions
 from mapfilter.tracks.readers.recorded_field import Field
 from mapfilter.tracks.readers.recorded_values import (
     checked_values,
-    duplicates,
     joined_parts,
     late_rows,
-    reordered,
 )
 from mapfilter.tracks.readers.recording import Clock, Recording
 from mapfilter.tracks.readers.remarks import CountedNotes, Remarks, number_or_share
 from mapfilter.tracks.readers.set_back import set_back_by
+from mapfilter.tracks.readers.stray_times import stray_times
 from mapfilter.tracks.readers.tables import RECORDED
 from mapfilter.tracks.readers.tallies import Tallies
+from mapfilter.tracks.readers.tidied_tables import tidied
 from mapfilter.tracks.readers.unusable import Unusable, nothing_usable
 from mapfilter.tracks.readers.wound import CAUSE
-from mapfilter.tracks.repeated_readings import repeated_readings
 from mapfilter.tracks.schema import NEIGHBOUR
 
 _LINES_KEPT = 3
-_EARLIEST_UTC_S, _LATEST_UTC_S = GPS_EPOCH_S, 4_102_444_800.0
-_TICKS = "likely: ticks since a phone was started; their unit in the header, as time_ms, reads them"
-_JUMP_S = DAY_S
-_STRAY_SHARE = 0.1
-_OF_STEPS = ("steps", "motion")
-_SEVERAL = ("radio", "satellites", "ephemerides")
-"""Tables that have several rows for each moment."""
 
 
 @dataclass(slots=True)
@@ -114,7 +102,9 @@ class Reading(Remarks):
             self.refuse(line[nowhere], "latitude and longitude are 0 (no fix yet)")
             good &= ~nowhere
         if "time_s" in checked:
-            good &= self._in_era(checked["time_s"], line, good)
+            for no_time, reason in stray_times(self.clock, checked["time_s"], good):
+                self.refuse(line[no_time], reason)
+                good &= ~no_time
         if not good.any():
             return
         if not good.all():
@@ -230,28 +220,6 @@ class Reading(Remarks):
             return ""
         return CAUSE if self.tallies.winding(table, known).doubtful else ""
 
-    def _in_era(self, time_s: Floats, line: Ints, good: Bools) -> Bools:
-        """Refuse times that are no dates, and few rows that lie days away from all others."""
-        kept = np.ones(len(line), dtype=bool)
-        if self.clock.kind != "monotonic":
-            kept = (time_s >= _EARLIEST_UTC_S) & (time_s <= _LATEST_UTC_S)
-            outside = good & ~kept
-            # Milliseconds or nanoseconds of a phone that runs for days look like Unix times.
-            early = outside.any() and bool((time_s[good] < _EARLIEST_UTC_S).all())
-            hint = f" ({_TICKS})" if early else ""
-            self.refuse(line[outside], f"time: not between 1980 and 2100{hint}")
-        index = np.flatnonzero(good & kept)
-        if index.size < 3:
-            return kept
-        order = index[np.argsort(time_s[index], kind="stable")]
-        group = np.concatenate([[0], np.cumsum(np.diff(time_s[order]) > _JUMP_S)])
-        sizes = np.bincount(group)
-        stray = order[sizes[group] < max(2, _STRAY_SHARE * sizes.max())]
-        if len(sizes) > 1 and stray.size < index.size:
-            self.refuse(np.sort(line[stray]), "time: more than a day away from all other rows")
-            kept[stray] = False
-        return kept
-
     def done(self, name: str, rows_word: str = "row") -> Recording:
         """Sort the tables, drop exact duplicates, and return the recording.
 
@@ -281,15 +249,17 @@ class Reading(Remarks):
         if late := late_rows(self.tables.values(), self.last_s, read=not self.unread):
             self.ignore(late)
         radio = self.tables.get("radio", ())
-        cells = bool(radio)
         by_cell = any((part["role"] == NEIGHBOUR).any() for part in radio)
-        kept = {
-            table: self._tidy(
-                table, joined_parts(self.tables.pop(table)), cells=cells, by_cell=by_cell
-            )
-            for table in RECORDED
-            if table in self.tables
-        }
+        kept = {}
+        for table in (table for table in RECORDED if table in self.tables):
+            rows = joined_parts(self.tables.pop(table))
+            if "time_s" in rows:
+                rows, notes, ignored = tidied(table, rows, cells=bool(radio), by_cell=by_cell)
+                for note in notes:
+                    self.note(note)
+                for note in ignored:
+                    self.ignore(note)
+            kept[table] = rows
         return Recording(
             self.path,
             name,
@@ -305,36 +275,3 @@ class Reading(Remarks):
             self.unread,
             self.named,
         )
-
-    def _tidy(self, table: str, rows: pd.DataFrame, *, cells: bool, by_cell: bool) -> pd.DataFrame:
-        """Sort a table and drop exact duplicates.
-
-        ``cells`` says whether a file has some, and ``by_cell`` whether it lists neighbours.
-        """
-        if "time_s" not in rows:
-            return rows
-        time = rows["time_s"].to_numpy()
-        if (np.diff(time) < 0).any():
-            rows = reordered(rows, np.argsort(time, kind="stable"))
-            time = rows["time_s"].to_numpy()
-        if table in _OF_STEPS:
-            rows, batches = without_batches(table, rows, repeated=cells)
-            if batches:
-                self.note(batches)
-            time = rows["time_s"].to_numpy()
-        if (np.diff(time) == 0).any():
-            duplicate = repeated_readings(rows, duplicates(rows))
-            if duplicate.any():
-                self.note(
-                    f"{table}: {number_of(int(duplicate.sum()), 'exact duplicate row')} dropped"
-                )
-                rows = rows[~duplicate].reset_index(drop=True)
-            # Equal steps are distance lost; a file with a row for each cell repeats them.
-            counted = time if table == "motion" and not by_cell else rows["time_s"]
-            if table not in _SEVERAL and (cut := cut_times(np.asarray(counted))):
-                self.ignore(f"{table}: {cut}")
-        if table == "positions":
-            rows, notes = own_positions(rows)
-            for note in notes:
-                self.ignore(note)
-        return rows
