@@ -94,12 +94,12 @@ def without_cells():
 def test_sources_stand_in_the_order_of_their_reports():
     names = ["gnss", "timing", "first fix", "radio"]
     assert [one.name for one in POSITIONER.sources] == names
-    assert POSITIONER.sources[0].clock
+    assert "pseudorange" in POSITIONER.sources[0].kinds
     streets = without_cells()
     assert [one.name for one in streets.sources] == [*names, "map"]
     on_grid = replace(streets, grid=True)
     assert [one.name for one in on_grid.sources] == names
-    assert not on_grid.sources[0].clock
+    assert on_grid.sources[0].kinds == {"gnss"}
     more = replace(streets, more_sources=(Silent(),))
     assert [one.name for one in more.sources] == [*names, "silent", "map"]
     assert set(more.begin().sources) == {*names, "silent", "map"}

@@ -24,7 +24,7 @@ from mapfilter.tracks.readers.times import LEAST_UNIX_S, parse_times, seconds_of
 _NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
 _DIGIT = r"\d"
 _WHOLE = r"^(?:[-+]?(\d{1,18}|[0-8]\d{18})|0[xX][0-9a-fA-F]{1,15})$"
-_SHORTENED = re.compile(r"\d+(?:[.,]\d+)?[eE]\+?\d+")
+_SHORTENED = re.compile(r"\d{1,9}(?:[.,]\d{1,17})?[eE]\+?\d{1,3}")
 MISSING = ("", "-", "nan", "NaN", "NA", "N/A", "null", "NULL", "None", "none", "#N/A")
 """Texts of missing values."""
 
