@@ -249,12 +249,13 @@ class Reading(Remarks):
         if late := late_rows(self.tables.values(), self.last_s, read=not self.unread):
             self.ignore(late)
         radio = self.tables.get("radio", ())
+        cells = bool(radio)
         by_cell = any((part["role"] == NEIGHBOUR).any() for part in radio)
         kept = {}
         for table in (table for table in RECORDED if table in self.tables):
             rows = joined_parts(self.tables.pop(table))
             if "time_s" in rows:
-                rows, notes, ignored = tidied(table, rows, cells=bool(radio), by_cell=by_cell)
+                rows, notes, ignored = tidied(table, rows, cells=cells, by_cell=by_cell)
                 for note in notes:
                     self.note(note)
                 for note in ignored:
