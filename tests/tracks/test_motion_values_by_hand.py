@@ -90,7 +90,8 @@ def test_the_error_of_a_speed_by_coarse_counts():
     assert coarse.speed_mps[10:90] == pytest.approx(20.0)
     assert way.speed_sd_mps == pytest.approx(1 / 6**0.5 / 10**0.5)
     # Errors of 0.05 m/s and less are none.
-    fine = counted_way(time_s, np.floor(20 * time_s * 10) / 10)
+    fine = counted_way(time_s, np.append(0.0, 0.1 + 20 * time_s[:-1]))
+    assert fine.least_m == pytest.approx(0.1)
     assert np.isnan(fine.speed_sd_mps)
 
 
