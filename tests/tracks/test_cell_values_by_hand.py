@@ -168,11 +168,11 @@ def test_a_network_in_one_number_is_three_digits_and_the_rest():
 
 def test_an_identity_of_lte_is_256_times_the_node_and_its_cell(read):
     """TS 36.413: 20 bits of the eNB ID and 8 of the cell."""
-    node = [1, 1, 1, 0, 2**20 - 1, 5, 5, 5]
-    sector = [0, 255, 256, 3, 254, NAN, NAN, NAN]
-    own = [NAN, NAN, NAN, NAN, NAN, 255, 256, 0]
+    node = [1, 1, 1, 0, 2**20 - 1, 5, 5, 5, 5, 5]
+    sector = [0, 255, 256, 3, 254, NAN, NAN, NAN, 3, 3]
+    own = [NAN, NAN, NAN, NAN, NAN, 255, 256, 0, 255, 256]
     radio = read(enodeb=node, sector=sector, cellid=own)
-    expected = [256, 511, NAN, NAN, 2**28 - 2, 5 * 256 + 255, 256, 5 * 256]
+    expected = [256, 511, NAN, NAN, 2**28 - 2, 5 * 256 + 255, 256, 5 * 256, 5 * 256 + 3, 256]
     assert radio["ci"].tolist() == pytest.approx(expected, nan_ok=True)
 
 
@@ -223,6 +223,14 @@ def test_cells_of_gnettrack(tmp_path):
     assert radio["level_dbm"].tolist() == [-81, -82, -83, -84]
     # Speeds are km/h.
     assert found["positions"]["speed_mps"].tolist() == pytest.approx([10, 0, 5, 1])
+
+
+def test_a_cell_of_gnettrack_without_node_and_identity_has_none(tmp_path):
+    path = tmp_path / "walk.txt"
+    names = "Node CellID RAWCELLID NetworkMode Level"
+    path.write_text(gnettrack(["0|7|-|LTE|-81", "1|7|-|LTE|-82", "1|7|300|LTE|-83"], names))
+    found = read_recording(path).tables["radio"]["ci"].tolist()
+    assert found == pytest.approx([NAN, 263, 300], nan_ok=True)
 
 
 def test_neighbours_of_gnettrack_up_to_the_eighteenth(tmp_path):

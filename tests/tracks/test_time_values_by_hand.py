@@ -15,7 +15,7 @@ from mapfilter.tracks.readers.local_times import (
     parse_zone,
     utc_from_local_s,
 )
-from mapfilter.tracks.readers.nmea_stamps import stamped_dates
+from mapfilter.tracks.readers.nmea_stamps import _stamp_s, stamped_dates
 from mapfilter.tracks.readers.plain_times import plain_times
 from mapfilter.tracks.readers.times import (
     are_days,
@@ -237,3 +237,20 @@ def test_dates_of_stamps_before_sentences(stamp, moment):
     data = stamp + b"$GPGGA,100000.00,"
     dates = stamped_dates(data, np.array([1]), np.array([36_000.0]))
     assert dates["midnight_s"].tolist() == [utc_s(*moment)]
+
+
+@pytest.mark.parametrize(
+    ("stamp", "seconds"),
+    [
+        (b"2026-05-01T15:30:00+05:30 ", 0.0),
+        (b"2026-05-01 06:31:02.75-0330 ", 62.0),
+        (b"2026-05-01 10:00:01Z ", 1.0),
+        (b"1777629600.25,", 0.25),
+        (b"1777629600250,", 0.25),
+        (b"177762960025,", NAN),
+        (b"2026-05-32 10:00:01Z ", NAN),
+    ],
+)
+def test_moments_of_stamps_before_sentences(stamp, seconds):
+    found = _stamp_s(stamp + b"$GPGGA,100000.00,", 0)
+    assert found == pytest.approx(utc_s(2026, 5, 1, 10) + seconds, nan_ok=True)

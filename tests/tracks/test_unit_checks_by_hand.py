@@ -49,9 +49,13 @@ def ended(table, name, values, **columns):
         ("radio", "level_dbm", [-80.0] * 5, [70.0, 71, 72, 73, 74], True),
         ("radio", "level_dbm", [-80.0] * 5, [70.0, 71, 72, 73, 74, 75], False),
         ("radio", "level_dbm", [-80.0] * 5, [99.0] * 9, True),
-        ("radio", "level_dbm", [-80.0] * 5, [999.0, 9999, 99_999, 999_999] * 3, True),
-        ("radio", "level_dbm", [-80.0] * 5, [32_767.0, 65_535, -32_768, 2e9, 2**31] * 3, True),
-        ("radio", "level_dbm", [-80.0] * 5, [998.0, 9998, 99_998, 1.9e9] * 3, False),
+        ("radio", "level_dbm", [-80.0] * 5, [2e9, 2**31, -(2**63)] * 3, True),
+        ("radio", "level_dbm", [-80.0] * 5, [1.9e9, -1.9e9] * 3, False),
+        ("radio", "level_dbm", [-80.0] * 5, [998.0, 9998] * 3, False),
+        *(
+            ("radio", "level_dbm", [-80.0] * 5, [mark, -mark] * 3, True)
+            for mark in (999.0, 9999, 99_999, 999_999, 32_767, 32_768, 65_535)
+        ),
         # Turns: a twentieth, and three numbers.
         ("motion", "turn_rad", [0.1] * 95, [7.0, 8, 9, 10, 11], True),
         ("motion", "turn_rad", [0.1] * 94, [7.0, 8, 9, 10, 11, 12], False),
