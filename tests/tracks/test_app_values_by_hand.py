@@ -39,12 +39,12 @@ def test_accuracies_of_gpx_are_stated_or_by_the_dilution(read):
             "<extensions><hAcc>2.5</hAcc><bearing>1</bearing></extensions>",
         ),
     ).tables["positions"]
-    assert found["accuracy_m"].tolist()[:3] == pytest.approx([3.2, 7.5, NAN], nan_ok=True)
+    assert found["accuracy_m"].tolist()[:3] == pytest.approx([3.2, 7.5, NAN], abs=1e-6, nan_ok=True)
     assert found["speed_mps"].tolist()[2] == 10.5
     assert found["course_deg"].tolist()[2] == 359.5
     assert (found["time_s"] - START_S).tolist() == [0, 1, 2, 3]
     assert found["altitude_m"].tolist() == [-12.5] * 4
-    assert found["lat_deg"].tolist() == pytest.approx([60, 60.0001, 60.0002, 60.0003])
+    assert found["lat_deg"].tolist() == pytest.approx([60, 60.0001, 60.0002, 60.0003], abs=1e-9)
 
 
 def antennas(stamp, *cells, operator="24491"):
@@ -83,8 +83,10 @@ def test_cells_of_antennas(read):
     assert found.notes == ()
     assert rows["level_dbm"].tolist() == [-52, -113, -99, -120]
     assert rows["censored"].tolist() == [1, 0, 0, 0]
-    assert rows["lac"].tolist() == pytest.approx([1377, NAN, 1377, 65_535], nan_ok=True)
-    assert rows["ci"].tolist() == pytest.approx([36_393, 36_392, NAN, 268_435_454], nan_ok=True)
+    assert rows["lac"].tolist() == pytest.approx([1377, NAN, 1377, 65_535], abs=1e-6, nan_ok=True)
+    assert rows["ci"].tolist() == pytest.approx(
+        [36_393, 36_392, NAN, 268_435_454], abs=1e-6, nan_ok=True
+    )
     assert rows["role"].tolist() == ["serving", "neighbour", "neighbour", "serving"]
     assert rows["technology"].tolist() == ["GSM", "GSM", "GSM", "LTE"]
     assert set(zip(rows["mcc"], rows["mnc"], strict=True)) == {(310, 410)}
@@ -109,7 +111,7 @@ def test_networks_of_wigle(read):
     found = read("a.csv", "WigleWifi-1.4,appRelease=2.26", head, *lines)
     rows = found.tables["radio"]
     assert rows["cell"].tolist() == ["244-91-3021-1170250", "310-410-0-7", "244-5-1-68719476734"]
-    assert rows["level_dbm"].tolist() == pytest.approx([-90, NAN, -90], nan_ok=True)
+    assert rows["level_dbm"].tolist() == pytest.approx([-90, NAN, -90], abs=1e-6, nan_ok=True)
     assert [one.lines for one in found.unusable] == [(5, 6)]
     positions = found.tables["positions"]
     assert positions["accuracy_m"].tolist() == [3.9] * 5

@@ -91,7 +91,9 @@ def test_years_of_two_digits(word, year):
 def test_times_of_day_of_sentences():
     texts = ["000000", "235959.75", "235960", "235961", "236000", "240000", "", "-1", "95.5"]
     expected = [0, 86_399.75, 86_400, *[np.nan] * 5, np.nan]
-    assert _of_day(np.array(texts, dtype=object)).tolist() == pytest.approx(expected, nan_ok=True)
+    assert _of_day(np.array(texts, dtype=object)).tolist() == pytest.approx(
+        expected, abs=1e-6, nan_ok=True
+    )
 
 
 @pytest.mark.parametrize(

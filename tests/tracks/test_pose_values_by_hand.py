@@ -86,11 +86,11 @@ def test_places_of_smartloc_on_the_ground():
         [[6_378_137.0, 0, 6_378_237, 6.1e6, 6.6e6], [0, 0, 0, 0, 0], [0, 6_356_752.3142, 0, 0, 0]]
     )
     lon, lat, altitude = _geodetic(place_m)
-    assert lon.tolist()[::2] == pytest.approx([0, 0, NAN], nan_ok=True)
-    assert lat.tolist() == pytest.approx([0, 90, 0, NAN, NAN], nan_ok=True)
+    assert lon.tolist()[::2] == pytest.approx([0, 0, NAN], abs=1e-6, nan_ok=True)
+    assert lat.tolist() == pytest.approx([0, 90, 0, NAN, NAN], abs=1e-6, nan_ok=True)
     assert altitude.tolist() == pytest.approx([0, 0, 100, NAN, NAN], abs=1e-3, nan_ok=True)
     assert _deviation(np.array([0.0025, 0.0, -1.0])).tolist() == pytest.approx(
-        [0.05, 0, NAN], nan_ok=True
+        [0.05, 0, NAN], abs=1e-6, nan_ok=True
     )
 
 
@@ -102,9 +102,11 @@ def test_rows_of_smartloc(read):
     (row,) = found.tables["odometry"].to_dict("records")
     assert (row["speed_mps"], row["yaw_rate_radps"]) == (2.25, 0.05)
     assert (row["speed_sd_mps"], row["yaw_rate_sd_radps"]) == pytest.approx((0.2, 0.03))
+    # A variance of 0 states none.
+    assert found.ignored == ()
     ranges = found.tables["satellites"]
     assert ranges["satellite"].tolist() == ["G07", "G07"]
-    assert ranges["sigma_m"].tolist() == pytest.approx([5, NAN], nan_ok=True)
+    assert ranges["sigma_m"].tolist() == pytest.approx([5, NAN], abs=1e-6, nan_ok=True)
     assert ranges["cn0_dbhz"].tolist() == [38, 38]
     assert ranges["pseudorange_m"].tolist() == [23_653_438.8] * 2
     # The earth turns by 7.292e-5 rad/s while the signal is under way for 78.9 ms.
