@@ -82,6 +82,16 @@ def test_times_of_day_in_one_number_jump_by_40_at_each_minute():
         assert reading.notes == []
 
 
+def test_three_minutes_begin_in_times_of_day_in_one_number():
+    second = np.arange(9 * 3600 + 56 * 60 + 1, 9 * 3600 + 59 * 60 + 59.0)
+    number = 90_000 + 100 * (second % 3600 // 60) + second % 60
+    assert _without_digits(Reading(Path("a.csv")), number).tolist() == second.tolist()
+    # 60 minutes are none.
+    later = number + 100
+    assert later[-1] == 96_058
+    assert _without_digits(Reading(Path("a.csv")), later).tolist() == later.tolist()
+
+
 def test_hours_of_a_time_of_day_are_24():
     second = np.arange(23 * 3600 + 50 * 60, 24 * 3600.0)
     number = 10_000 * (second // 3600) + 100 * (second % 3600 // 60) + second % 60
