@@ -27,7 +27,9 @@ def test_cells_and_access_points_of_wigle(tmp_path):
     np.testing.assert_array_equal(cells["level_dbm"], LEVEL_DBM)
     assert set(cells["role"]) == {"serving"}
     assert cells["cell"].iloc[0] == "244-91-3021-1170250"
-    np.testing.assert_allclose(cells["time_s"], START_UTC_S + STEP_S * np.arange(COUNT))
+    np.testing.assert_allclose(
+        cells["time_s"], START_UTC_S + STEP_S * np.arange(COUNT), rtol=0, atol=1e-6
+    )
     points = radio[radio["technology"] == "WIFI"]
     assert set(points["role"]) == {"neighbour"}
     assert points["cell"].iloc[1] == "1a:9f:ee:5c:71:01"
@@ -109,7 +111,9 @@ def test_speeds_of_obd_among_the_frames_of_a_bus(tmp_path):
     found = read_recording(path)
     rows = found.tables["odometry"]
     np.testing.assert_allclose(rows["speed_mps"], (20 + np.arange(COUNT) % 5) / 3.6)
-    np.testing.assert_allclose(rows["time_s"], START_UTC_S + STEP_S * np.arange(COUNT) + 0.01)
+    np.testing.assert_allclose(
+        rows["time_s"], START_UTC_S + STEP_S * np.arange(COUNT) + 0.01, rtol=0, atol=1e-6
+    )
     assert found.clock.absolute
     assert any("60 lines of other frames not used" in note for note in found.ignored)
     assert mf.read_log(path).motion["step_m"].notna().all()

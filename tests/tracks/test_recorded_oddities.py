@@ -46,7 +46,7 @@ def test_positions_that_a_faster_program_repeats_are_those_of_the_receiver(read)
         "positions: 2700 rows repeat those of a receiver that measures every 1 s, left out"
     )
     assert len(places(found)) == COUNT
-    np.testing.assert_allclose(places(found)["time_s"], TIME_S)
+    np.testing.assert_allclose(places(found)["time_s"], TIME_S, rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["each second", "at rest", "by distance"])
@@ -169,7 +169,7 @@ def test_days_of_a_spreadsheet(read, name):
 def test_a_date_that_stays_over_midnight(read):
     times = [(START + pd.Timedelta(50_300 + i, "s")).strftime("%H:%M:%S") for i in range(COUNT)]
     found = read(date="2026-05-13", time=times, lat=LAT, lon=LON)
-    np.testing.assert_allclose(places(found)["time_s"], TIME_S + 50_300)
+    np.testing.assert_allclose(places(found)["time_s"], TIME_S + 50_300, rtol=0, atol=1e-6)
     assert any("the date stays the same over midnight" in note for note in found.notes)
 
 
@@ -181,11 +181,15 @@ def test_a_date_that_stays_over_midnight_in_a_file_read_in_parts(read, monkeypat
     lines = [f"2026-05-13,{at},{60 + i / 1e5:.5f},25.0" for i, at in enumerate(times)]
     monkeypatch.setattr(text, "_PART_BYTES", rows * (len(lines[0]) + 1))
     found = read(written="\n".join(["date,time,lat,lon", *lines]))
-    np.testing.assert_allclose(places(found)["time_s"], START.timestamp() + time_s)
+    np.testing.assert_allclose(
+        places(found)["time_s"], START.timestamp() + time_s, rtol=0, atol=1e-6
+    )
     dates = np.where(np.arange(COUNT) < 150, "2026-05-13", "2026-05-14")
     lines = [f"{date}{line[10:]}" for date, line in zip(dates, lines, strict=True)]
     found = read(written="\n".join(["date,time,lat,lon", *lines]))
-    np.testing.assert_allclose(places(found)["time_s"], START.timestamp() + time_s)
+    np.testing.assert_allclose(
+        places(found)["time_s"], START.timestamp() + time_s, rtol=0, atol=1e-6
+    )
 
 
 def parted_drive(read, monkeypatch, rows, kept=(), **columns):
