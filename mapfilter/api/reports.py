@@ -15,7 +15,7 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.options import Positive
 from mapfilter.positioning.fingerprints.located import LocatedReports
 from mapfilter.positioning.fingerprints.locating import locate_by, locator_for
-from mapfilter.positioning.fingerprints.options import AUTO, Method
+from mapfilter.positioning.fingerprints.options import AUTO, LEVEL_ERROR_DB, Method
 from mapfilter.positioning.fingerprints.reports import Reports
 from mapfilter.positioning.fingerprints.sources import reports_of_database, reports_of_logs
 from mapfilter.tracks.identify import name_by_plan
@@ -29,7 +29,7 @@ def locate_reports(
     database: RadioRouteDatabase | Path | str | Reports | TrackLog | Iterable[TrackLog],
     method: Method | str = AUTO,
     *,
-    level_error_db: float = 6.0,
+    level_error_db: float = LEVEL_ERROR_DB,
     seed: int | np.random.Generator = 0,
 ) -> LocatedReports:
     """Locate each report of a log by itself, without motion.

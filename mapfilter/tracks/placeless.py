@@ -41,6 +41,9 @@ def in_frame(log: TrackLog, crs: str, about_deg: tuple[float, float] | None = No
 
     Parameters
     ----------
+    log : TrackLog
+    crs : str
+        Projected CRS of the area.
     about_deg : (float, float) or None
         Latitude and longitude of the area. North of a local frame is true north, from which
         headings are turned to that of ``crs`` there; None leaves them as they are.

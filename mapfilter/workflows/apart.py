@@ -73,6 +73,8 @@ def check_inputs_kept(inputs: Iterable[Path], replaced: Iterable[Path]) -> None:
 
     Parameters
     ----------
+    inputs : iterable of Path
+        Files and folders that are read.
     replaced : iterable of Path
         All that is written, and what is left of older results.
     """

@@ -11,6 +11,7 @@ from mapfilter.database.manifest import MANIFEST
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail, noted
 from mapfilter.geodesy import short_crs
+from mapfilter.positioning.fingerprints.options import LEVEL_ERROR_DB
 from mapfilter.positioning.fingerprints.reports import Reports
 from mapfilter.positioning.fingerprints.sources import (
     is_table,
@@ -31,7 +32,6 @@ from mapfilter.tracks.readers.text import read_text
 from mapfilter.tracks.store import is_log
 
 _PEEKED_BYTES = 1 << 18
-_LEVEL_ERROR_DB = 6.0
 WITHOUT_STEPS = OpenOptions(combine=CombineOptions(walk=None))
 """Single reports need no motion."""
 
@@ -52,7 +52,7 @@ def read_database(
     if (path / MANIFEST).is_file():
         opened = open_database(path)
         _refuse("--crs", crs, path, f"none, as it is in {short_crs(opened.lattice.crs)}")
-        error_db = _LEVEL_ERROR_DB if level_error_db is None else level_error_db
+        error_db = LEVEL_ERROR_DB if level_error_db is None else level_error_db
         return reports_of_database(opened, error_db), opened.plan
     _refuse("--level-error", level_error_db, path, "a radio-route database, whose levels have one")
     if not _is_fingerprints(path) and all(is_log(one) for one in _journeys(path)):

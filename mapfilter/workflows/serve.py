@@ -20,7 +20,7 @@ from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.fingerprints.locating import fit_locator
-from mapfilter.positioning.fingerprints.options import AUTO
+from mapfilter.positioning.fingerprints.options import AUTO, LEVEL_ERROR_DB
 from mapfilter.positioning.fingerprints.sources import reports_of_database
 from mapfilter.radio.plan_names import PlanNames
 from mapfilter.serving.app import Service
@@ -78,7 +78,7 @@ class ServeOptions:
     @property
     def error_db(self) -> float:
         """Standard deviation of predicted levels."""
-        return 6.0 if self.level_error_db is None else self.level_error_db
+        return LEVEL_ERROR_DB if self.level_error_db is None else self.level_error_db
 
     def check(self) -> None:
         """Raise ConfigError with all faults of the numbers."""

@@ -104,6 +104,8 @@ METHODS: dict[str, type[Method]] = {
     "gp": SurveyMaps,
 }
 """Methods by name."""
+LEVEL_ERROR_DB = 6.0
+"""Standard deviation of predicted levels for single reports, where none is given."""
 AUTO = "auto"
 """The name that stands for the best of :data:`CANDIDATES` in cross-validation."""
 CANDIDATES: tuple[Method, ...] = (

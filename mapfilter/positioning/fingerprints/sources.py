@@ -16,6 +16,7 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError, fail
 from mapfilter.positioning.fingerprints.joining import joined_reports
 from mapfilter.positioning.fingerprints.log_reports import reports_of_log
+from mapfilter.positioning.fingerprints.options import LEVEL_ERROR_DB
 from mapfilter.positioning.fingerprints.planned import Planned, level_deviations_db
 from mapfilter.positioning.fingerprints.reports import Reports, make_reports
 from mapfilter.radio.cells import CellPlan
@@ -56,7 +57,9 @@ def named_neighbours(log: TrackLog, plan: CellPlan) -> TrackLog:
     return replace(log, radio=radio.assign(cell=pd.Series(found, index=radio.index, dtype=object)))
 
 
-def reports_of_database(database: RadioRouteDatabase, level_error_db: float = 6.0) -> Reports:
+def reports_of_database(
+    database: RadioRouteDatabase, level_error_db: float = LEVEL_ERROR_DB
+) -> Reports:
     """Return the levels of a radio-route database as reports at its points.
 
     Where usual values stand for what the plan of a cell lacks, its levels err by more
