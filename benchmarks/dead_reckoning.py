@@ -17,7 +17,11 @@ import pandas as pd
 
 from mapfilter.geodesy import grid_convergence_rad, project, utm_crs
 from mapfilter.tracks.deadreckoning import dead_reckon
-from mapfilter.tracks.moved import motion_from_course, motion_from_odometry, rotation_matrices
+from mapfilter.tracks.joining.moved import (
+    motion_from_course,
+    motion_from_odometry,
+    rotation_matrices,
+)
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.pdr.vehicle import reckon_odometry
 from mapfilter.tracks.pdr.walk import reckon_walk

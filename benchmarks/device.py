@@ -30,7 +30,7 @@ from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.loop import locate
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.store import read_log
-from mapfilter.workflows.bench_filter import make_world
+from mapfilter.workflows.benchmarks.filter import make_world
 
 _FIX_SD_M, _EPOCHS_A_FIX = 9.0, 7
 

@@ -20,7 +20,7 @@ from mapfilter._types import Floats
 from mapfilter.experiments.papers.fritsche_klein_2009.scene import Layout, Scene, draw, scene
 from mapfilter.filters.gaussian import EKF, RBUKF, Method
 from mapfilter.workflows.bench import median_seconds
-from mapfilter.workflows.bench_fusion import estimates
+from mapfilter.workflows.benchmarks.fusion import estimates
 
 _TRIALS, _PEER_STEPS, _RUNS = 500, 100, 5
 

@@ -36,9 +36,9 @@ from mapfilter.positioning.loop import locate
 from mapfilter.simulation.worlds.faults import TURNED_DEG, GivenInputs
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.store import list_logs, read_log
-from mapfilter.workflows.evaluate_foreign import load_foreign, prepare, write_journeys
+from mapfilter.workflows.evaluations.foreign import load_foreign, prepare, write_journeys
+from mapfilter.workflows.inputs.world import World
 from mapfilter.workflows.learn import run_accept, run_learn
-from mapfilter.workflows.world import World
 
 CASE = "faults-together"
 NEW_JOURNEYS, FIRST_NEW = 20, 1000

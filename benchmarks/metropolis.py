@@ -32,9 +32,9 @@ from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.evaluation.accuracy import SUCCESS_RADIUS_M
 from mapfilter.evaluation.success import wilson_interval
 from mapfilter.lattice import Lattice
-from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.area.area_map import AreaMap
+from mapfilter.positioning.bayes.area.tiled_area import TiledArea
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.bayes.tiled_area import TiledArea
 from mapfilter.positioning.merging import epochs
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.roads.index import HALF_WIDTH_M

@@ -15,7 +15,7 @@ import numpy as np
 from mapfilter.experiments.benchmarks.ottawa_sessions import read_session
 from mapfilter.experiments.benchmarks.single_reports import locate_sessions, row_of
 from mapfilter.geodesy import utm_crs
-from mapfilter.workflows.evaluate_ottawa import session_files
+from mapfilter.workflows.evaluations.ottawa import session_files
 
 _SHARES = (5, 25, 50, 75, 95)
 

@@ -14,7 +14,7 @@ from mapfilter.positioning.integrity import sample_tail
 from mapfilter.report.canvas import BLUE, GREY, ORANGE, VERMILLION, new_figure, styled, tidy
 from mapfilter.report.integrity import plot_coverage, plot_stanford
 from mapfilter.report.saving import save
-from mapfilter.workflows.evaluate_foreign import load_foreign, run_foreign
+from mapfilter.workflows.evaluations.foreign import load_foreign, run_foreign
 
 SMALL_CITY = (
     'area.map="manhattan"',

@@ -33,11 +33,11 @@ from mapfilter.positioning.positioned_track import Snapshot
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.snapshots import plot_belief, story_bounds_m
-from mapfilter.tracks.identify import name_by_plan
+from mapfilter.tracks.joining.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.store import list_logs, read_log
-from mapfilter.workflows.filter_choice import filter_choice
-from mapfilter.workflows.served import served_points, street_map
+from mapfilter.workflows.inputs.filter_choice import filter_choice
+from mapfilter.workflows.outputs.served import served_points, street_map
 
 GALLERY = Path(__file__).parent / "_static" / "gallery"
 PICTURES = {

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from mapfilter.workflows.pipeline import Stage, run_pipeline
 from mapfilter.workflows.replay import run_replay
-from mapfilter.workflows.replayed import replay_figures
+from mapfilter.workflows.replays.figures import replay_figures
 from mapfilter.workflows.simulate import run_simulate
 
 if __name__ == "__main__":

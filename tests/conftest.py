@@ -84,7 +84,7 @@ def _no_waiting_for_disks(request: pytest.FixtureRequest) -> Iterator[None]:
 @pytest.fixture(scope="module")
 def few_single_reports() -> Iterator[None]:
     """Locate few single reports beside each replay: they take longer than the replay itself."""
-    from mapfilter.workflows import replay_baseline
+    from mapfilter.workflows.replays import baseline as replay_baseline
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(replay_baseline, "MOST_REPORTS", 20)

@@ -109,7 +109,7 @@ def _sweeping(work: Path, out: Path) -> Job:
     from mapfilter.config.load import load_config
     from mapfilter.experiments.sweep.run import sweep
     from mapfilter.experiments.sweep.table import read_runs
-    from mapfilter.workflows.sweep_plan import sweep_plans, sweep_world
+    from mapfilter.workflows.sweeps.plan import sweep_plans, sweep_world
 
     config = work / "inputs" / "world" / "world.toml"
     plans = [sweep_plans(load_config(config, [*_GRID, f"sweep.seed={v}"])) for v in (0, 1)]
@@ -202,7 +202,7 @@ def kill(work: Path, count: int, seed: int = 1) -> Counter[str]:
     """Kill each of the writers in turn at random moments, and look at what it left."""
     turns = _TURNS if count >= len(_TURNS) else ("build", "merge")
     make_inputs(work, *sorted(set(turns)))
-    later = ["mapfilter.workflows.learn", "mapfilter.workflows.sweep_plan"]
+    later = ["mapfilter.workflows.learn", "mapfilter.workflows.sweeps.plan"]
     context = _forks(*(later if "sweep" in turns else ()))
     with _outcomes(work, "kill") as outcomes:
         jobs = {name: job_of(name, work) for name in sorted(set(turns))}

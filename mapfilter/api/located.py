@@ -41,10 +41,10 @@ from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, f
 from mapfilter.positioning.positioned_track import PositionedTrack
 from mapfilter.positioning.timing_steps import with_one_step, with_plan_technologies
 from mapfilter.radio.cells import CellPlan
-from mapfilter.tracks.identify import name_by_plan
+from mapfilter.tracks.checks.placeless import in_frame
+from mapfilter.tracks.checks.range_units import with_range_notes
+from mapfilter.tracks.joining.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.placeless import in_frame
-from mapfilter.tracks.range_units import with_range_notes
 from mapfilter.viewing.notebook import View
 from mapfilter.viewing.runs import ViewedRun
 from mapfilter.viewing.trace import TraceRecorder
@@ -133,7 +133,7 @@ class Track:
             Where to draw; a new figure when left out.
         """
         from mapfilter.report.track import plot_track
-        from mapfilter.workflows.served import served_points, street_map
+        from mapfilter.workflows.outputs.served import served_points, street_map
 
         base = None
         if self.database is not None:

@@ -15,13 +15,13 @@ from mapfilter.api.python_words import python_log
 from mapfilter.errors import ConfigError, Faults, fail
 from mapfilter.geodesy import projected_crs, same_crs, short_crs, shown_crs
 from mapfilter.tracks import log as tables
+from mapfilter.tracks.checks.placeless import LOCAL_FRAME, is_local_frame
+from mapfilter.tracks.joining.named_files import check_origin, offsets_by_path
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.motion_factors import check_factors
-from mapfilter.tracks.named_files import check_origin, offsets_by_path
 from mapfilter.tracks.open_log import open_log
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.pdr.options import WalkOptions
-from mapfilter.tracks.placeless import LOCAL_FRAME, is_local_frame
 
 _FILES = "a path, or several"
 _WALK = WalkOptions()

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from mapfilter.api.logs import read_log, read_log_of_area
 from mapfilter.errors import ConfigError, Faults, InputError
+from mapfilter.tracks.checks.motion_fault import MotionFault
+from mapfilter.tracks.checks.refused_motion import AS_HEADING, note_refused
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.motion_factors import check_factors, scaled_log
-from mapfilter.tracks.motion_fault import MotionFault
-from mapfilter.tracks.refused_motion import AS_HEADING, note_refused
 
 
 def with_right_motion(

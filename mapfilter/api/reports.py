@@ -18,9 +18,9 @@ from mapfilter.positioning.fingerprints.locating import locate_by, locator_for
 from mapfilter.positioning.fingerprints.options import AUTO, LEVEL_ERROR_DB, Method
 from mapfilter.positioning.fingerprints.reports import Reports
 from mapfilter.positioning.fingerprints.sources import reports_of_database, reports_of_logs
-from mapfilter.tracks.identify import name_by_plan
+from mapfilter.tracks.checks.range_units import with_range_notes
+from mapfilter.tracks.joining.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.range_units import with_range_notes
 
 
 @python_words()

@@ -21,7 +21,7 @@ from mapfilter.evaluation.accuracy import (
 from mapfilter.evaluation.truth import Truth
 from mapfilter.evaluation.truth_notes import truth_notes
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.tracks.misplaced import check_near
+from mapfilter.tracks.checks.misplaced import check_near
 from mapfilter.tracks.tables import tidy_table
 
 _NO_TRUTH = (

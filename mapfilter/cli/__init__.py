@@ -24,7 +24,7 @@ from mapfilter.cli.options import DONE
 from mapfilter.cli.serving import serve
 from mapfilter.cli.tracks import demo, locate, replay, simulate
 from mapfilter.cli.views import film, view
-from mapfilter.workflows.guard import guarded
+from mapfilter.workflows.outputs.guard import guarded
 
 __all__ = ["app", "main"]
 

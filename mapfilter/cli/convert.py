@@ -22,7 +22,7 @@ from mapfilter.cli.options import (
     walk_changes,
 )
 from mapfilter.errors import ConfigError, Faults
-from mapfilter.workflows.terminal import print_result, print_text
+from mapfilter.workflows.outputs.terminal import print_result, print_text
 
 if TYPE_CHECKING:
     from mapfilter.tracks.pdr.options import WalkOptions
@@ -84,7 +84,7 @@ def convert(
     as_json: JsonOption = False,
 ) -> None:
     """Convert recordings of other programs to a track log."""
-    from mapfilter.tracks.named_files import check_origin, offsets_by_path
+    from mapfilter.tracks.joining.named_files import check_origin, offsets_by_path
     from mapfilter.tracks.open_options import CombineOptions, OpenOptions
     from mapfilter.workflows.convert import parse_pairs, report_lines, run_convert
 

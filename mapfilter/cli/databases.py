@@ -28,8 +28,8 @@ from mapfilter.cli.options import (
     seeded,
     toml,
 )
-from mapfilter.workflows.progress_bars import progress_bar
-from mapfilter.workflows.terminal import print_message, print_result, print_text
+from mapfilter.workflows.outputs.progress_bars import progress_bar
+from mapfilter.workflows.outputs.terminal import print_message, print_result, print_text
 
 _OF_BOUND = {
     "FirstFixOptions, spacing_m": "--spacing",
@@ -71,7 +71,7 @@ def check(
         result = CheckResult(True, ()) if database is not None else run_check(loaded, progress)
         if logs is not None:
             # Here, as it imports all that learns from journeys.
-            from mapfilter.workflows.check_suspects import checked_together, run_check_suspects
+            from mapfilter.workflows.checks.suspects import checked_together, run_check_suspects
 
             result = checked_together(result, run_check_suspects(loaded, progress))
     if as_json:

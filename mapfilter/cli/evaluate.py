@@ -23,8 +23,8 @@ from mapfilter.cli.options import (
     refuse,
     toml,
 )
-from mapfilter.workflows.progress_bars import rate_bar
-from mapfilter.workflows.terminal import print_result
+from mapfilter.workflows.outputs.progress_bars import rate_bar
+from mapfilter.workflows.outputs.terminal import print_result
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +158,7 @@ def evaluate(
 
 
 def _ottawa(asked: _Asked) -> tuple[Any, Any]:
-    from mapfilter.workflows.evaluate_ottawa import RUNS, run_ottawa
+    from mapfilter.workflows.evaluations.ottawa import RUNS, run_ottawa
 
     other = None if asked.filter_name == "bayes" else asked.filter_name
     unused = {"--map": asked.map_file, "--bbox": asked.bbox, "--case": asked.cases}
@@ -172,7 +172,7 @@ def _ottawa(asked: _Asked) -> tuple[Any, Any]:
 
 
 def _all(asked: _Asked) -> tuple[Any, Any]:
-    from mapfilter.workflows.evaluate_recorded import run_all
+    from mapfilter.workflows.evaluations.recorded import run_all
 
     refuse(asked.of_simulation, asked.name)
     with nothing_left(asked.folder), rate_bar("evaluate", "runs") as progress:
@@ -182,7 +182,7 @@ def _all(asked: _Asked) -> tuple[Any, Any]:
 
 
 def _recordings(asked: _Asked) -> tuple[Any, Any]:
-    from mapfilter.workflows.evaluate_recorded import run_recorded
+    from mapfilter.workflows.evaluations.recorded import run_recorded
 
     refuse(asked.of_simulation, asked.name)
     with nothing_left(asked.folder), rate_bar("evaluate", "runs") as progress:
@@ -203,7 +203,7 @@ def _without_units(result: Any) -> dict[str, Any]:
 
 
 def _single_reports(asked: _Asked) -> tuple[Any, Any]:
-    from mapfilter.workflows.evaluate_single_reports import SETS, run_single_reports
+    from mapfilter.workflows.evaluations.single_reports import SETS, run_single_reports
 
     refuse(asked.of_simulation, asked.name)
     unused = {"--runs": asked.runs, "--seed": asked.seed or None, "--resume": asked.resume or None}
@@ -215,8 +215,8 @@ def _single_reports(asked: _Asked) -> tuple[Any, Any]:
 
 def _audit(asked: _Asked) -> tuple[Any, Any]:
     from mapfilter.workflows.evaluate import RUNS
-    from mapfilter.workflows.evaluate_audit import audit_table, run_audit
-    from mapfilter.workflows.evaluate_settings import load_benchmark
+    from mapfilter.workflows.evaluations.audit import audit_table, run_audit
+    from mapfilter.workflows.evaluations.settings import load_benchmark
 
     refuse({"--data": asked.data, "--world": asked.world}, asked.name)
     given = asked.given
@@ -238,8 +238,8 @@ def _audit(asked: _Asked) -> tuple[Any, Any]:
 
 def _simulated(asked: _Asked) -> tuple[Any, Any]:
     from mapfilter.workflows.evaluate import RUNS, main_table, run_global_positioning
-    from mapfilter.workflows.evaluate_foreign import load_foreign, other_world, run_foreign
-    from mapfilter.workflows.evaluate_settings import load_benchmark
+    from mapfilter.workflows.evaluations.foreign import load_foreign, other_world, run_foreign
+    from mapfilter.workflows.evaluations.settings import load_benchmark
 
     refuse({"--data": asked.data}, asked.name)
     foreign = other_world(asked.world)

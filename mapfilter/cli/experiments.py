@@ -28,9 +28,9 @@ from mapfilter.cli.options import (
 )
 from mapfilter.errors import Stopped
 from mapfilter.experiments.papers import PAPERS
-from mapfilter.workflows.guard import stopped_text
-from mapfilter.workflows.progress_bars import rate_bar
-from mapfilter.workflows.terminal import print_message, print_result
+from mapfilter.workflows.outputs.guard import stopped_text
+from mapfilter.workflows.outputs.progress_bars import rate_bar
+from mapfilter.workflows.outputs.terminal import print_message, print_result
 
 *_FIRST, _LAST = PAPERS
 
@@ -56,7 +56,7 @@ def sweep(
 ) -> None:
     """Run filters over a grid of noises and options; exit code 3 if it was stopped on the way."""
     from mapfilter.workflows.sweep import forecast_sweep, load_sweep, run_sweep, vary_axes
-    from mapfilter.workflows.sweep_tables import brief, brief_pairs
+    from mapfilter.workflows.sweeps.tables import brief, brief_pairs
 
     loaded = load_sweep(config, seeded(settings, seed, "sweep.seed"), out=out)
     check_custom_filter(loaded)

@@ -21,8 +21,8 @@ from mapfilter.cli.options import (
     toml,
 )
 from mapfilter.errors import ConfigError, fail
-from mapfilter.workflows.progress_bars import progress_bar
-from mapfilter.workflows.terminal import print_message, print_result
+from mapfilter.workflows.outputs.progress_bars import progress_bar
+from mapfilter.workflows.outputs.terminal import print_message, print_result
 
 _ALL = "all"
 

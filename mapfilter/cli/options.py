@@ -162,7 +162,7 @@ def column_map(texts: list[str] | None) -> dict[str, str]:
     """
     if not texts:
         return {}
-    from mapfilter.tracks.readers.csv_fields import check_fields
+    from mapfilter.tracks.readers.plain.fields import check_fields
     from mapfilter.workflows.convert import parse_pairs
 
     columns, faults = parse_pairs(texts, "--column"), Faults()

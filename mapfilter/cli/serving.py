@@ -9,7 +9,7 @@ import typer
 
 from mapfilter.cli.options import ConfigOption, SetOption, given_path, refuse
 from mapfilter.errors import ConfigError, fail
-from mapfilter.workflows.progress_bars import progress_bar
+from mapfilter.workflows.outputs.progress_bars import progress_bar
 
 
 def serve(

@@ -38,8 +38,8 @@ from mapfilter.cli.options import (
 )
 from mapfilter.errors import ConfigError, already_noted, fail
 from mapfilter.tracks.schema import Without
-from mapfilter.workflows.progress_bars import progress_bar, stage_bar
-from mapfilter.workflows.terminal import print_message, print_result, print_text
+from mapfilter.workflows.outputs.progress_bars import progress_bar, stage_bar
+from mapfilter.workflows.outputs.terminal import print_message, print_result, print_text
 
 _UNPROTECTED = "candidate"
 """The built-in filter without protection levels."""
@@ -210,14 +210,14 @@ def replay(
     as_json: JsonOption = False,
 ) -> None:
     """Locate one log, or every log of a folder; exit code 3 if done in part."""
-    from mapfilter.workflows.drawer import drawer_process
+    from mapfilter.workflows.outputs.drawer import drawer_process
 
     # What draws starts before the imports below, which take as long as its own.
     with nullcontext() if undrawn(config, settings or ()) else drawer_process() as drawers:
         from mapfilter.config.load import load_config
         from mapfilter.workflows.replay import run_replay, unnamed_database
-        from mapfilter.workflows.replay_text import replay_text
-        from mapfilter.workflows.replayed import replay_figures
+        from mapfilter.workflows.replays.figures import replay_figures
+        from mapfilter.workflows.replays.text import replay_text
 
         given = seeded(settings, seed, "journeys.seed")
         paths = {"database.path": database, "track.path": log[0] if log else None}

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from mapfilter.cli.options import JsonOption, given_path
-from mapfilter.workflows.terminal import print_result
+from mapfilter.workflows.outputs.terminal import print_result
 
 
 def _given_paths(paths: list[Path]) -> list[Path]:

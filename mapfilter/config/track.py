@@ -16,7 +16,7 @@ from mapfilter.config.fields import (
     with_options,
 )
 from mapfilter.tracks.pdr.options import WalkOptions
-from mapfilter.tracks.readers.csv_fields import FIELDS as RECORDED_FIELDS
+from mapfilter.tracks.readers.plain.fields import FIELDS as RECORDED_FIELDS
 from mapfilter.tracks.schema import Without
 
 

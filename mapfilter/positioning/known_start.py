@@ -11,7 +11,7 @@ from mapfilter._inputs import shown
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import unproject
 from mapfilter.lattice import Lattice, outside_m
-from mapfilter.tracks.misplaced import misplaced_by
+from mapfilter.tracks.checks.misplaced import misplaced_by
 
 START_REACH_M, START_REACH_SD = 500.0, 5.0
 """A start is of this area up to so far outside, or up to so many of its own deviations."""

@@ -13,8 +13,8 @@ from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.kalman.models import KalmanOptions
 from mapfilter.positioning.log_options import by_streets_alone
+from mapfilter.tracks.checks.misplaced import check_near
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.misplaced import check_near
 from mapfilter.tracks.schema import PLACE, SERVING
 
 if TYPE_CHECKING:

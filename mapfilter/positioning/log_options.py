@@ -22,9 +22,9 @@ from mapfilter.positioning.logged_errors import (
 )
 from mapfilter.positioning.vehicle_signs import vehicle_signs
 from mapfilter.radio.identities import TIMING_STEP_M
+from mapfilter.tracks.checks.motion_fault import fault_notes
+from mapfilter.tracks.checks.speeds import speed_fault
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.motion_fault import fault_notes
-from mapfilter.tracks.speeds import speed_fault
 
 STREETS_ALONE = "no cells in the log: located by streets, and by positions where it has some"
 

@@ -10,10 +10,10 @@ from mapfilter._types import Floats
 from mapfilter.models.street_motion import MotionErrors
 from mapfilter.positioning.kalman.models import KalmanOptions
 from mapfilter.positioning.sensors.pace import WALKERS_MPS
+from mapfilter.tracks.checks.speeds import FASTEST_MPS
+from mapfilter.tracks.checks.turn_drift import turn_drift_radps
+from mapfilter.tracks.checks.turn_noise import turns_at_standstill
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.speeds import FASTEST_MPS
-from mapfilter.tracks.turn_drift import turn_drift_radps
-from mapfilter.tracks.turn_noise import turns_at_standstill
 
 _LEAST_STEP_SD_M, _LEAST_HEADING_SD_DEG = 0.05, 0.5
 """Least errors that a filter assumes: particles need some spread."""

@@ -27,8 +27,8 @@ from mapfilter.serving.documents import (
     whole,
 )
 from mapfilter.serving.places import in_metres
-from mapfilter.tracks.neighbour_codes import CODED, CodedRow, neighbours_by_code
-from mapfilter.tracks.repeated_readings import repeated_readings
+from mapfilter.tracks.checks.repeated_readings import repeated_readings
+from mapfilter.tracks.joining.neighbour_codes import CODED, CodedRow, neighbours_by_code
 from mapfilter.tracks.schema import (
     LEAST_PLACE_M,
     MISSING_SIGNS,

@@ -15,14 +15,14 @@ from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.known_start import ELSEWHERE, MOST_SD_M, check_place
 from mapfilter.serving.documents import RequestError, check_keys, number
-from mapfilter.tracks.misplaced import (
+from mapfilter.tracks.checks.misplaced import (
     check_near,
     degrees_for_metres,
     misplaced_by,
     nearest_m,
 )
-from mapfilter.tracks.no_fix import holds_no_fix, no_fix_note
-from mapfilter.tracks.position_units import RADIUS_68
+from mapfilter.tracks.joining.no_fix import holds_no_fix, no_fix_note
+from mapfilter.tracks.joining.position_units import RADIUS_68
 
 _RANGES = {"lat_deg": 90.0, "lon_deg": 180.0, "sd_m": MOST_SD_M}
 _AS_A_PHONE = ("lat_deg", "lon_deg", "accuracy_m")

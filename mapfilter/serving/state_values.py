@@ -19,15 +19,15 @@ from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.level_memory import LevelMemory
-from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
+from mapfilter.positioning.bayes.beliefs.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.certainty import Recovery
-from mapfilter.positioning.bayes.held import HeldOtherwise
-from mapfilter.positioning.bayes.hold import Hold
-from mapfilter.positioning.bayes.mirrored import MirroredTwin
-from mapfilter.positioning.bayes.path import DeadReckoning, RecentPath
+from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, NullHypothesis
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
+from mapfilter.positioning.bayes.rivals.hold import Hold
+from mapfilter.positioning.bayes.rivals.mirrored import MirroredTwin
+from mapfilter.positioning.bayes.sources.timing import TimingState
+from mapfilter.positioning.bayes.sources.timing_errors import DifferenceErrors
 from mapfilter.positioning.bayes.state import BayesState, Reported
-from mapfilter.positioning.bayes.timing import TimingState
-from mapfilter.positioning.bayes.timing_errors import DifferenceErrors
 from mapfilter.positioning.epochs import GnssFix, ReportRow
 from mapfilter.positioning.gnss.biases import Biases
 from mapfilter.positioning.gnss.receiver import Receiver

@@ -14,7 +14,7 @@ import pyarrow.compute as pc
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.errors import Faults
-from mapfilter.tracks.readers.wound import CAUSE, TURN_RAD, Winding
+from mapfilter.tracks.readers.recorded.wound import CAUSE, TURN_RAD, Winding
 from mapfilter.tracks.schema import MISSING_SIGNS, Column
 
 _SHOWN_ROWS = 3

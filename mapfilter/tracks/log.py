@@ -25,10 +25,8 @@ from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import projected_crs, short_crs
 from mapfilter.gnss.almanacs import Almanac
 from mapfilter.gnss.broadcast import UNPLACED
-from mapfilter.tracks.clock_steps import with_clocks_gone_on
-from mapfilter.tracks.geographic import in_metres
-from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.log_checks import (
+from mapfilter.tracks.checks.clock_steps import with_clocks_gone_on
+from mapfilter.tracks.checks.log_checks import (
     TIMES_BEGIN,
     check_clocks,
     check_days,
@@ -40,10 +38,12 @@ from mapfilter.tracks.log_checks import (
     truth_far_off,
     undirected_note,
 )
+from mapfilter.tracks.checks.misplaced import FAR_APART
+from mapfilter.tracks.checks.motion_faults import compared_places, motion_faults
+from mapfilter.tracks.imu_noise import ImuNoise
+from mapfilter.tracks.joining.geographic import in_metres
+from mapfilter.tracks.joining.moved import UNDIRECTED
 from mapfilter.tracks.log_times import seconds_of_tables
-from mapfilter.tracks.misplaced import FAR_APART
-from mapfilter.tracks.motion_faults import compared_places, motion_faults
-from mapfilter.tracks.moved import UNDIRECTED
 from mapfilter.tracks.satellites import place_satellites
 from mapfilter.tracks.schema import PLACE, TABLES
 from mapfilter.tracks.tables import tidy_table

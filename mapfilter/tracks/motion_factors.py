@@ -10,8 +10,8 @@ import pandas as pd
 
 from mapfilter.angles import wrap_rad
 from mapfilter.errors import Faults, InputError
+from mapfilter.tracks.checks.motion_fault import MOTION_COLUMNS, fault_notes
 from mapfilter.tracks.log import TrackLog, make_log
-from mapfilter.tracks.motion_fault import MOTION_COLUMNS, fault_notes
 from mapfilter.tracks.schema import TABLES
 
 

@@ -11,18 +11,18 @@ import pandas as pd
 
 from mapfilter.errors import InputError, noted
 from mapfilter.radio.cells import CellPlan
-from mapfilter.tracks.identify import name_by_plan
+from mapfilter.tracks.joining.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.motion_factors import scaled_log
 from mapfilter.tracks.open_options import OpenOptions
 from mapfilter.tracks.pdr.options import without_effect
-from mapfilter.tracks.readers.zipped import zip_of
+from mapfilter.tracks.readers.texts.zipped import zip_of
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.sensors import sensors_of
 from mapfilter.tracks.store import HEAD, files_in, is_log, list_logs, read_log
 
 if TYPE_CHECKING:
-    from mapfilter.tracks.readers.recording import Recording
+    from mapfilter.tracks.readers.recorded.recording import Recording
 
 _READY = "the motion of a track log is used as it is; convert the recording with it"
 
@@ -57,7 +57,7 @@ def open_log(
         Projected CRS for recordings: that of the database. "" for the UTM zone of their positions.
         A track log keeps its own.
     plan : CellPlan, optional
-        Gives reported cells its ids, see :func:`mapfilter.tracks.identify.name_by_plan`.
+        Gives reported cells its ids, see :func:`mapfilter.tracks.joining.identify.name_by_plan`.
     options : OpenOptions, optional
 
     Raises
@@ -80,8 +80,8 @@ def open_log(
         opened = OpenedLog(given[0].name, log, sensors)
     else:
         # Here, as a track log needs none of what reads and joins recordings.
-        from mapfilter.tracks.combine import combine
-        from mapfilter.tracks.recordings import read_recordings, with_measured, with_remarks
+        from mapfilter.tracks.joining.combine import combine
+        from mapfilter.tracks.joining.recordings import read_recordings, with_measured, with_remarks
 
         recordings, notes = read_recordings(given, options)
         wanted = with_measured(options.combine, given)

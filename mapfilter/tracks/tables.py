@@ -15,9 +15,9 @@ from mapfilter._words import number_of
 from mapfilter.angles import wrap_rad
 from mapfilter.errors import Faults, listed
 from mapfilter.radio.identities import LIMITS, technology
+from mapfilter.tracks.checks.cut_times import cut_times
+from mapfilter.tracks.checks.repeated_readings import repeated_readings
 from mapfilter.tracks.column_values import TableFaults, column_values, note_values
-from mapfilter.tracks.cut_times import cut_times
-from mapfilter.tracks.repeated_readings import repeated_readings
 from mapfilter.tracks.schema import (
     LEAST_PLACE_M,
     MOST_PLACE_M,

@@ -16,8 +16,8 @@ from mapfilter._types import Floats
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError
 from mapfilter.geodesy import unproject
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.filter import BayesPositioner
-from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.ways import Bounds
 from mapfilter.viewing.explain import TERMS

@@ -5,7 +5,7 @@ runner-up, or all of the alternative. The likelihood of an epoch's readings unde
 likelihood of its particles, by their weights; readings are taken one after another, each given
 those before it, so that their log-likelihoods add up to that of the epoch, and the differences of
 two hypotheses to the change of their log odds. All likelihoods are those of the filter's model
-(:meth:`~mapfilter.positioning.bayes.evidence_model.EvidenceModel.weigh`), asked for the
+(:meth:`~mapfilter.positioning.bayes.sources.evidence_model.EvidenceModel.weigh`), asked for the
 first one, two, three readings and so on.
 """
 
@@ -24,10 +24,10 @@ from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.filters.resampling import log_sum
 from mapfilter.models.fingerprint import pixels
-from mapfilter.positioning.bayes.alternative import MapBelief
-from mapfilter.positioning.bayes.evidence import EvidenceUpdate, RadioReading
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.filter import BayesPositioner
-from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.rivals.alternative import MapBelief
+from mapfilter.positioning.bayes.sources.evidence import EvidenceUpdate, RadioReading
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.bayes.weighing import weighed_by
 

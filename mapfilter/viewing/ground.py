@@ -16,7 +16,7 @@ from mapfilter.database.field import RadioField
 from mapfilter.database.points import Points
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.models.level_errors import roughness
-from mapfilter.positioning.bayes.area_frame import BELOW_FLOOR_DB
+from mapfilter.positioning.bayes.area.area_frame import BELOW_FLOOR_DB
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.layers import layers_of
 from mapfilter.roads.ways import Bounds

@@ -17,9 +17,9 @@ from scipy.special import log_ndtr
 
 from mapfilter._types import Floats
 from mapfilter.models.level_memory import OTHER_DBM, OTHER_SD_DB
-from mapfilter.positioning.bayes.area_frame import AreaFrame
-from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.area.area_frame import AreaFrame
+from mapfilter.positioning.bayes.area.area_map import AreaMap
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.state import FIRST_SPACING_M
 
 MAP_M = 25.0

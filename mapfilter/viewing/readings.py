@@ -11,7 +11,7 @@ import numpy as np
 from mapfilter._types import Floats, Ints
 from mapfilter.filters.contract import Reason
 from mapfilter.models.fingerprint import pixels
-from mapfilter.positioning.bayes.area_frame import AreaFrame
+from mapfilter.positioning.bayes.area.area_frame import AreaFrame
 from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.merging import epochs

@@ -30,13 +30,13 @@ from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.lattice import RouteLattice
 
 if TYPE_CHECKING:
-    from mapfilter.workflows.bench_device import DeviceBench
-    from mapfilter.workflows.bench_filter import FilterBench
-    from mapfilter.workflows.bench_fusion import FusionBench
-    from mapfilter.workflows.bench_memory import MemoryBench
-    from mapfilter.workflows.bench_peers import PeersBench
-    from mapfilter.workflows.bench_sweep import SweepBench
-    from mapfilter.workflows.bench_threads import ThreadsBench
+    from mapfilter.workflows.benchmarks.device import DeviceBench
+    from mapfilter.workflows.benchmarks.filter import FilterBench
+    from mapfilter.workflows.benchmarks.fusion import FusionBench
+    from mapfilter.workflows.benchmarks.memory import MemoryBench
+    from mapfilter.workflows.benchmarks.peers import PeersBench
+    from mapfilter.workflows.benchmarks.sweep import SweepBench
+    from mapfilter.workflows.benchmarks.threads import ThreadsBench
 
 CRS = "EPSG:32629"
 STAGES = ("build", "filter", "fusion", "sweep")
@@ -122,34 +122,34 @@ def run_bench(
         if stage != "filter":
             raise fail(ConfigError, "bench --device", "the stage filter", stage)
         opened = open_device(device, "bench --device")
-        from mapfilter.workflows.bench_device import bench_device
+        from mapfilter.workflows.benchmarks.device import bench_device
 
         return bench_device(opened, runs=runs)
     if memory:
-        from mapfilter.workflows.bench_memory import bench_memory
+        from mapfilter.workflows.benchmarks.memory import bench_memory
 
         return bench_memory(stage)
     if (peers or threads > 1) and stage != "filter":
         given = "--peers" if peers else "--threads"
         raise fail(ConfigError, f"bench {given}", "the stage filter", stage)
     if threads > 1:
-        from mapfilter.workflows.bench_threads import bench_threads
+        from mapfilter.workflows.benchmarks.threads import bench_threads
 
         return bench_threads(threads, runs=runs)
     if peers:
-        from mapfilter.workflows.bench_peers import bench_peers
+        from mapfilter.workflows.benchmarks.peers import bench_peers
 
         return bench_peers(runs=runs)
     if stage == "filter":
-        from mapfilter.workflows.bench_filter import bench_filter
+        from mapfilter.workflows.benchmarks.filter import bench_filter
 
         return bench_filter(runs=runs)
     if stage == "fusion":
-        from mapfilter.workflows.bench_fusion import bench_fusion
+        from mapfilter.workflows.benchmarks.fusion import bench_fusion
 
         return bench_fusion(runs=runs)
     if stage == "sweep":
-        from mapfilter.workflows.bench_sweep import bench_sweep
+        from mapfilter.workflows.benchmarks.sweep import bench_sweep
 
         return bench_sweep(runs=runs)
     with tempfile.TemporaryDirectory(prefix="mapfilter-bench-") as name:

@@ -25,7 +25,7 @@ from mapfilter.radio.layers import layer_numbers
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.coverage import plot_point_values, plot_twins
 from mapfilter.report.saving import save
-from mapfilter.workflows.apart import check_out_apart
+from mapfilter.workflows.inputs.apart import check_out_apart
 
 NOTES = (
     "exact for the error model: the bound from given gradients; bits by the serving cell",

@@ -30,14 +30,14 @@ from mapfilter.radio.plan_notes import layer_notes
 from mapfilter.rasters.geotiff import READINGS_TAG, tag_of
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
-from mapfilter.workflows.pictures import NETWORK_PICTURES, clear_pictures, draw_network
-from mapfilter.workflows.world import (
+from mapfilter.workflows.inputs.world import (
     World,
     map_cover,
     planned_rasters,
     raster_cover,
     raster_world,
 )
+from mapfilter.workflows.outputs.pictures import NETWORK_PICTURES, clear_pictures, draw_network
 
 _NAMED = 6
 _FEW_POINTS = 0.1

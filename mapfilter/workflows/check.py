@@ -37,17 +37,17 @@ from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.survey.measurement_rows import NO_TIME
 from mapfilter.survey.measurements import Measurements
-from mapfilter.workflows.check_logs import check_logs
-from mapfilter.workflows.check_places import (
+from mapfilter.workflows.checks.logs import check_logs
+from mapfilter.workflows.checks.places import (
     check_pixels,
     check_rasters_place,
     check_same_pixels,
     check_sites,
     check_ways,
 )
-from mapfilter.workflows.stated_power import cells_without_eirp
-from mapfilter.workflows.survey_inputs import survey_inputs
-from mapfilter.workflows.world import World, planned_rasters, roads_lattice
+from mapfilter.workflows.inputs.stated_power import cells_without_eirp
+from mapfilter.workflows.inputs.survey_inputs import survey_inputs
+from mapfilter.workflows.inputs.world import World, planned_rasters, roads_lattice
 
 _STAGES = 5
 

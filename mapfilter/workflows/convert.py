@@ -13,11 +13,11 @@ import pandas as pd
 from mapfilter._words import number_of
 from mapfilter.errors import ConfigError, OutputError, fail, noted
 from mapfilter.geodesy import short_crs
-from mapfilter.tracks.combine import combine
 from mapfilter.tracks.imu_noise import ImuNoise
+from mapfilter.tracks.joining.combine import combine
+from mapfilter.tracks.joining.recordings import read_recordings, with_measured, with_remarks
 from mapfilter.tracks.open_options import OpenOptions
-from mapfilter.tracks.readers.recording import Recording
-from mapfilter.tracks.recordings import read_recordings, with_measured, with_remarks
+from mapfilter.tracks.readers.recorded.recording import Recording
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.store import check_log_replaceable, write_log
 

@@ -14,7 +14,7 @@ from mapfilter.database.merge import merge
 from mapfilter.database.merge_notes import merge_notes
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, fail
-from mapfilter.workflows.apart import check_out_apart
+from mapfilter.workflows.inputs.apart import check_out_apart
 
 
 def run_merge(

@@ -18,11 +18,11 @@ from mapfilter.config.load import load_config
 from mapfilter.config.sections import Config
 from mapfilter.workflows.build import draw_database, run_build
 from mapfilter.workflows.kernels import WORKERS, begin_kernels, to_compile
+from mapfilter.workflows.outputs.track_pictures import get_ready_to_draw
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.replay import run_replay
-from mapfilter.workflows.replayed import ReplayedLog
+from mapfilter.workflows.replays.figures import ReplayedLog
 from mapfilter.workflows.simulate import run_simulate
-from mapfilter.workflows.track_pictures import get_ready_to_draw
 from mapfilter.workflows.views import run_view
 
 _STAGES = {

@@ -38,13 +38,13 @@ from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.reflections import NlosModel
 from mapfilter.simulation.satellites import ReceptionModel
-from mapfilter.workflows.evaluate_recorded import ALL
-from mapfilter.workflows.evaluate_recorded import NAMES as RECORDED
-from mapfilter.workflows.evaluate_runs import run_cases, street_base
-from mapfilter.workflows.filter_choice import filter_choice
-from mapfilter.workflows.result_text import to_jsonable
+from mapfilter.workflows.evaluations.recorded import ALL
+from mapfilter.workflows.evaluations.recorded import NAMES as RECORDED
+from mapfilter.workflows.evaluations.runs import run_cases, street_base
+from mapfilter.workflows.inputs.filter_choice import filter_choice
+from mapfilter.workflows.inputs.world import World
+from mapfilter.workflows.outputs.result_text import to_jsonable
 from mapfilter.workflows.simulate import simulation_settings
-from mapfilter.workflows.world import World
 
 OF_DATA = (ALL, *RECORDED, "single-reports")
 """Benchmarks on published data."""
@@ -155,7 +155,7 @@ def run_global_positioning(
     Parameters
     ----------
     config, fixed
-        From :func:`mapfilter.workflows.evaluate_settings.load_benchmark`.
+        From :func:`mapfilter.workflows.evaluations.settings.load_benchmark`.
     out : Path
         Gets the world, the finished batches, ``table.json`` and ``pictures``.
     runs, seed : int

@@ -17,7 +17,7 @@ from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.radio.cell_layouts import ATOLL, COLUMNS
 from mapfilter.radio.tables import read_table
 from mapfilter.tracks.schema import TABLES
-from mapfilter.workflows.info_results import result_info
+from mapfilter.workflows.descriptions.results import result_info
 
 _MAPS = (".pbf", ".osm", ".osm.gz", ".osm.bz2")
 _LAYERS = (".gpkg", ".shp", ".geojson", ".fgb")
@@ -66,7 +66,7 @@ def run_info(path: Path) -> dict[str, Any]:
         return found
     if found := _recordings_info(_recordings_in(path), _USE_OF_FOLDERS):
         return found
-    from mapfilter.workflows.info_tables import tables_info
+    from mapfilter.workflows.descriptions.log_tables import tables_info
 
     if found := tables_info(path):
         return found
@@ -75,7 +75,7 @@ def run_info(path: Path) -> dict[str, Any]:
     from mapfilter.rasters.opening import is_raster_folder
 
     if is_raster_folder(path):
-        from mapfilter.workflows.info_geo import raster_info
+        from mapfilter.workflows.descriptions.geo import raster_info
 
         try:
             return raster_info(path)
@@ -114,7 +114,7 @@ def _file_info(path: Path) -> dict[str, Any]:
         hint = hint if whole else "pandas, geopandas and QGIS open it"
         raise fail(InputError, str(path), _EXPECTED, "a Parquet file", hint)
     if suffix in _LAYERS or (suffix == ".json" and _is_geojson(path)):
-        from mapfilter.workflows.info_geo import layers_info
+        from mapfilter.workflows.descriptions.geo import layers_info
 
         return layers_info(path)
     if suffix == ".mat":
@@ -126,7 +126,7 @@ def _file_info(path: Path) -> dict[str, Any]:
         load_config(path, [])
         return {"kind": "configuration", "use": f"mapfilter check -c {path.name}"}
     from mapfilter.tracks.readers.formats import format_of
-    from mapfilter.tracks.readers.zipped import files_in_zip, is_zip
+    from mapfilter.tracks.readers.texts.zipped import files_in_zip, is_zip
 
     if format_of(path) is not None:
         return _recording_info(path)
@@ -136,7 +136,7 @@ def _file_info(path: Path) -> dict[str, Any]:
             return found
     if suffix in _TABLES and _INDEX_COLUMN not in _first_line(path):
         return _table_info(path)
-    from mapfilter.workflows.info_geo import raster_info, tiff_info
+    from mapfilter.workflows.descriptions.geo import raster_info, tiff_info
 
     if suffix in (".tif", ".tiff"):
         return tiff_info(path)

@@ -29,9 +29,9 @@ from mapfilter.models.fingerprint import BoundReading, weigh_by_bound
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.street_motion import STATES
 from mapfilter.models.way_map import all_inside, weight_inside
-from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.area.area_map import AreaMap
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
+from mapfilter.positioning.bayes.sources.evidence import RadioReading
 from mapfilter.positioning.fingerprints.likelihood_kernel import add_reading
 from mapfilter.positioning.integrity import sample_tail
 from mapfilter.positioning.step_output import protected_m

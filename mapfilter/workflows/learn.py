@@ -18,10 +18,10 @@ from mapfilter.errors import ConfigError, fail
 from mapfilter.learning.apply import apply_patch
 from mapfilter.learning.patch import read_patch, write_patch
 from mapfilter.learning.phone import PhoneNoise
-from mapfilter.workflows.apart import check_out_apart
-from mapfilter.workflows.learn_report import PATCH, older_report, write_report
-from mapfilter.workflows.learn_study import study_logs
-from mapfilter.workflows.logs import journeys_of
+from mapfilter.workflows.inputs.apart import check_out_apart
+from mapfilter.workflows.inputs.logs import journeys_of
+from mapfilter.workflows.lessons.report import PATCH, older_report, write_report
+from mapfilter.workflows.lessons.study import study_logs
 
 
 @dataclass(frozen=True)

@@ -31,13 +31,13 @@ from mapfilter.positioning.fingerprints.reports import Reports
 from mapfilter.report.canvas import BLUE, GREY
 from mapfilter.report.cumulative import Distribution, axis_end_m, plot_cumulative
 from mapfilter.report.saving import save
-from mapfilter.tracks.misplaced import check_near
+from mapfilter.tracks.checks.misplaced import check_near
+from mapfilter.tracks.checks.placeless import is_local_frame
 from mapfilter.tracks.open_options import OpenOptions
-from mapfilter.tracks.placeless import is_local_frame
-from mapfilter.workflows.apart import check_inputs_kept, check_out_apart
-from mapfilter.workflows.fingerprints import WITHOUT_STEPS, read_database, read_reports
-from mapfilter.workflows.result_text import to_jsonable
-from mapfilter.workflows.results import (
+from mapfilter.workflows.inputs.apart import check_inputs_kept, check_out_apart
+from mapfilter.workflows.inputs.fingerprints import WITHOUT_STEPS, read_database, read_reports
+from mapfilter.workflows.outputs.result_text import to_jsonable
+from mapfilter.workflows.outputs.results import (
     FIGURES,
     PICTURE_OF_REPORTS,
     POSITIONS,

@@ -8,10 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mapfilter.workflows.guard import guarded
-from mapfilter.workflows.replay_text import replay_text
-from mapfilter.workflows.result_text import to_jsonable
-from mapfilter.workflows.terminal import print_message, print_result
+from mapfilter.workflows.outputs.guard import guarded
+from mapfilter.workflows.outputs.result_text import to_jsonable
+from mapfilter.workflows.outputs.terminal import print_message, print_result
+from mapfilter.workflows.replays.text import replay_text
 
 if TYPE_CHECKING:
     from mapfilter.config.sections import Config

@@ -28,8 +28,8 @@ from mapfilter.radio.plan_notes import carrier_notes
 from mapfilter.rasters.geotiff_writer import is_as_written, write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters
-from mapfilter.workflows.apart import check_no_input_replaced
-from mapfilter.workflows.world import World, map_cover
+from mapfilter.workflows.inputs.apart import check_no_input_replaced
+from mapfilter.workflows.inputs.world import World, map_cover
 
 if TYPE_CHECKING:
     from mapfilter.workflows.survey import SurveyResult

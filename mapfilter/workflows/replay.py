@@ -20,22 +20,22 @@ from mapfilter.errors import ConfigError, fail, noted
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.filter import FilterOptions
 from mapfilter.positioning.kalman.filter import KalmanFilter
-from mapfilter.workflows.apart import check_inputs_kept, check_out_apart, named_inputs
-from mapfilter.workflows.filter_choice import filter_choice
+from mapfilter.workflows.inputs.apart import check_inputs_kept, check_out_apart, named_inputs
+from mapfilter.workflows.inputs.filter_choice import filter_choice
 from mapfilter.workflows.kernels import compiled_beside
-from mapfilter.workflows.replay_baseline import Baselines
-from mapfilter.workflows.replay_filters import ReplayFilters
-from mapfilter.workflows.replay_log import LogReplay
-from mapfilter.workflows.replay_logs import ReplayLogs
-from mapfilter.workflows.replayed import ReplayResult, summary_figures, summary_of
-from mapfilter.workflows.result_text import to_jsonable
-from mapfilter.workflows.results import (
+from mapfilter.workflows.outputs.result_text import to_jsonable
+from mapfilter.workflows.outputs.results import (
     SUMMARY,
     check_figures_of_replay,
     older_results,
     replaced_by_replay,
 )
-from mapfilter.workflows.track_pictures import drawn_beside
+from mapfilter.workflows.outputs.track_pictures import drawn_beside
+from mapfilter.workflows.replays.baseline import Baselines
+from mapfilter.workflows.replays.figures import ReplayResult, summary_figures, summary_of
+from mapfilter.workflows.replays.filters import ReplayFilters
+from mapfilter.workflows.replays.located_log import LogReplay
+from mapfilter.workflows.replays.logs import ReplayLogs
 
 
 def run_replay(

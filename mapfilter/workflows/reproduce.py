@@ -26,8 +26,8 @@ from mapfilter.report.table import write_table
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.sweep import sweep_executor
-from mapfilter.workflows.sweep_plan import sweep_world
-from mapfilter.workflows.sweep_tables import brief
+from mapfilter.workflows.sweeps.plan import sweep_world
+from mapfilter.workflows.sweeps.tables import brief
 
 CITY = "synthetic"
 """The map where none is given."""

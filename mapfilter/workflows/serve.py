@@ -32,8 +32,8 @@ from mapfilter.serving.server import listen, run
 from mapfilter.serving.sessions import Sessions
 from mapfilter.serving.store import SessionStore
 from mapfilter.viewing.bundle import database_bundle
-from mapfilter.workflows.filter_choice import filter_choice
-from mapfilter.workflows.terminal import print_message
+from mapfilter.workflows.inputs.filter_choice import filter_choice
+from mapfilter.workflows.outputs.terminal import print_message
 
 TOKEN_VARIABLE = "MAPFILTER_TOKEN"
 

@@ -28,9 +28,9 @@ from mapfilter.survey.measurements import Measurements
 from mapfilter.survey.options import SurveyOptions
 from mapfilter.survey.plan_faults import plan_faults
 from mapfilter.survey.survey_rasters import predicted_levels, surveyed_plan, write_survey
-from mapfilter.workflows.pictures import clear_pictures
-from mapfilter.workflows.survey_inputs import survey_inputs
-from mapfilter.workflows.survey_pictures import SURVEY_PICTURES, SurveyEvidence, draw_survey
+from mapfilter.workflows.inputs.survey_inputs import survey_inputs
+from mapfilter.workflows.outputs.pictures import clear_pictures
+from mapfilter.workflows.outputs.survey_pictures import SURVEY_PICTURES, SurveyEvidence, draw_survey
 
 _NAMED = 6
 

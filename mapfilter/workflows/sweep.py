@@ -42,8 +42,8 @@ from mapfilter.report.success import (
     plot_success_map,
 )
 from mapfilter.report.table import write_table
-from mapfilter.workflows.sweep_plan import sweep_databases, sweep_plans, sweep_world
-from mapfilter.workflows.sweep_tables import cell_table, pair_table
+from mapfilter.workflows.sweeps.plan import sweep_databases, sweep_plans, sweep_world
+from mapfilter.workflows.sweeps.tables import cell_table, pair_table
 
 _WHITE = {f"{section}{name}" for section in ("", "imu.") for name in NOISE_AXES[:2]}
 _MOST_CURVES, _MOST_GROUPS = 8, 16

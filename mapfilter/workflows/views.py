@@ -22,8 +22,8 @@ from mapfilter.viewing.bundle import database_bundle
 from mapfilter.viewing.layers import frame_of, with_bound, with_buildings
 from mapfilter.viewing.merge import side_by_side
 from mapfilter.viewing.page import read_page, write_page
-from mapfilter.workflows.apart import check_out_apart
-from mapfilter.workflows.results import REPLAY_HTML
+from mapfilter.workflows.inputs.apart import check_out_apart
+from mapfilter.workflows.outputs.results import REPLAY_HTML
 
 VIEW_HTML = "view.html"
 

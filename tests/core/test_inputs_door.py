@@ -341,24 +341,27 @@ ALLOWED = {
     # From files that a door opened, or from bytes that were read.
     ("tracks/sensors.py", "read_csv"), ("tracks/sensors.py", "open_parquet"),
     ("tracks/table_files.py", "read_csv"), ("tracks/table_files.py", "open_parquet"),
-    ("tracks/readers/lines.py", "read_csv"), ("positioning/fingerprints/tables.py", "read_csv"),
+    ("tracks/readers/texts/lines.py", "read_csv"),
+    ("positioning/fingerprints/tables.py", "read_csv"),
     ("experiments/benchmarks/ottawa_sessions.py", "read_csv"), ("radio/tables.py", "ZipFile"),
-    ("tracks/readers/zipped.py", "ZipFile"), ("tracks/readers/zipped.py", "open"),
+    ("tracks/readers/texts/zipped.py", "ZipFile"), ("tracks/readers/texts/zipped.py", "open"),
     ("roads/osm_xml.py", "read_dataframe"), ("roads/osm_xml.py", "GzipFile"),
     ("roads/osm_xml.py", "open"),
-    ("workflows/info_geo.py", "list_layers"), ("workflows/info_geo.py", "read_info"),
+    ("workflows/descriptions/geo.py", "list_layers"),
+    ("workflows/descriptions/geo.py", "read_info"),
     ("viewing/page.py", "GzipFile"),
     # Who calls it is listed here by `open_parquet`.
     ("_arrow.py", "ParquetFile"),
     # The null device, in place of an output that the caller closed.
-    ("workflows/guard.py", "open"),
+    ("workflows/outputs/guard.py", "open"),
     # Parts of the page that come with the package.
     ("viewing/page.py", "read_text"),
     ("experiments/recorded/denver.py", "read_csv"), ("experiments/recorded/mall.py", "open"),
     # An empty file that is locked only.
     ("_alone.py", "open"),
     # New files; journeys; the kernel's own; the code of a custom filter, which runs anyway.
-    ("workflows/replay_logs.py", "open"), ("rasters/geotiff_writer.py", "open"), ("_io.py", "open"),
+    ("workflows/replays/logs.py", "open"), ("rasters/geotiff_writer.py", "open"),
+    ("_io.py", "open"),
     ("database/estimate.py", "read_text"), ("_code.py", "read_bytes"), ("_replace.py", "read_text"),
     ("_workers.py", "open"), ("database/parquet.py", "open"), ("serving/store.py", "open"),
     ("positioning/custom_filter.py", "read_bytes"),

@@ -15,7 +15,7 @@ from mapfilter._json_files import read_json, write_sealed
 from mapfilter.errors import MapfilterError, StoreError
 from mapfilter.radio.tables import read_table as read_plan_table
 from mapfilter.survey.measurement_files import DIALECTS, read_csv
-from mapfilter.tracks.readers.text import read_text
+from mapfilter.tracks.readers.texts.text import read_text
 from mapfilter.tracks.table_files import read_table
 
 UTF_32 = ["utf-32-le", "utf-32-be"]

@@ -12,7 +12,7 @@ from mapfilter.radio.tables import read_table
 from mapfilter.rasters.atoll import find_index
 from mapfilter.roads.landuse import _read_table as read_classes
 from mapfilter.survey.measurement_files import DIALECTS, read_csv
-from mapfilter.tracks.readers.text import read_text
+from mapfilter.tracks.readers.texts.text import read_text
 from mapfilter.tracks.sensors import read_sensors
 
 CRS = "EPSG:32635"

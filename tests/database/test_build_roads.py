@@ -11,7 +11,7 @@ from mapfilter.database.merge import merge
 from mapfilter.database.sources import LatticeRoutes
 from mapfilter.database.store import info, open_database
 from mapfilter.errors import InputError, OutputError
-from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.area.opened_area import open_area
 
 
 @pytest.fixture(scope="module")

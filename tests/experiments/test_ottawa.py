@@ -33,9 +33,9 @@ from mapfilter.lattice import Lattice
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.measured_map import MeasuredMapOptions, MeasuredRows, ServingStatistics
 from mapfilter.models.street_motion import STATES
-from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.sources.evidence import RadioReading
 from mapfilter.rasters.opening import open_rasters
-from mapfilter.workflows.evaluate_ottawa import Task, find_left_out, run_ottawa
+from mapfilter.workflows.evaluations.ottawa import Task, find_left_out, run_ottawa
 
 CRS = "EPSG:32618"
 WEST, SOUTH = 445_000.0, 5_030_000.0

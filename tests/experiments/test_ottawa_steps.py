@@ -21,7 +21,7 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.geodesy import unproject
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.step_output import Fix
-from mapfilter.tracks.sampling import sampling_sd_m
+from mapfilter.tracks.joining.sampling import sampling_sd_m
 
 # On the central meridian grid north is north.
 CRS = "EPSG:32618"

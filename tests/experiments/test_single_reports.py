@@ -7,7 +7,7 @@ import pytest
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.experiments.benchmarks.ottawa import FOLDER
 from mapfilter.experiments.benchmarks.single_reports import read_wifi
-from mapfilter.workflows.evaluate_single_reports import run_single_reports
+from mapfilter.workflows.evaluations.single_reports import run_single_reports
 
 
 def test_published_data_are_located_better_than_by_three_neighbours(shared_data, tmp_path):

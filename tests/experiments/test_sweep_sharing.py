@@ -17,7 +17,7 @@ from mapfilter.positioning.loop import locate
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.sweep import load_sweep
-from mapfilter.workflows.sweep_plan import sweep_plans, sweep_world
+from mapfilter.workflows.sweeps.plan import sweep_plans, sweep_world
 
 TOWN = [
     "area.map=helsinki",

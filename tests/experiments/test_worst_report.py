@@ -15,7 +15,7 @@ from mapfilter.experiments.recorded.worst_report import (
 from mapfilter.positioning.fingerprints.located import LocatedReports
 from mapfilter.positioning.fingerprints.options import Neighbours
 from mapfilter.positioning.fingerprints.reports import make_reports
-from mapfilter.workflows.recorded_pictures import draw_report
+from mapfilter.workflows.evaluations.recorded_pictures import draw_report
 
 CRS = "EPSG:32632"
 

@@ -23,9 +23,9 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.kinds import leave_out
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.store import read_log, write_log
-from mapfilter.workflows import learn_study
-from mapfilter.workflows.check_suspects import run_check_suspects
+from mapfilter.workflows.checks.suspects import run_check_suspects
 from mapfilter.workflows.learn import run_learn
+from mapfilter.workflows.lessons import study as learn_study
 
 pytestmark = pytest.mark.usefixtures("small_pictures")
 JOURNEYS, FEW_JOURNEYS = 5, 3
@@ -143,7 +143,7 @@ def test_suspects_are_named_by_logs_alone(faulty, monkeypatch):
     # With truth in place of tracks, which are tested above, the check is quick.
     real = learn_study.study_logs
     monkeypatch.setattr(
-        "mapfilter.workflows.check_suspects.study_logs",
+        "mapfilter.workflows.checks.suspects.study_logs",
         lambda *args, **named: real(*args, **(named | {"use_truth": True})),
     )
     result = run_check_suspects(configured(*faulty))
@@ -159,7 +159,7 @@ def test_journeys_of_no_use_are_warned_of(faulty, monkeypatch):
         patch=SimpleNamespace(changes=()), unlisted=(), unused=("j1, j2 not used: no motion",)
     )
     monkeypatch.setattr(
-        "mapfilter.workflows.check_suspects.study_logs", lambda *_args, **_named: taught
+        "mapfilter.workflows.checks.suspects.study_logs", lambda *_args, **_named: taught
     )
     config = configured(*faulty)
     result = run_check_suspects(config)

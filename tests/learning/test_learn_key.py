@@ -9,7 +9,7 @@ import pytest
 
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.tracks.log import make_log
-from mapfilter.workflows.learn_key import study_key
+from mapfilter.workflows.lessons.key import study_key
 
 DATABASE = SimpleNamespace(generation="first")
 

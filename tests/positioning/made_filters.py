@@ -8,14 +8,14 @@ import numpy as np
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.positioning.bayes.alternative import (
+from mapfilter.positioning.bayes.beliefs.path import DeadReckoning
+from mapfilter.positioning.bayes.rivals.alternative import (
     AlternativeHypothesis,
     AlternativeRules,
     NullHypothesis,
 )
-from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm
-from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
-from mapfilter.positioning.bayes.path import DeadReckoning
+from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules, PullRules
+from mapfilter.positioning.bayes.sources.evidence import EvidenceUpdate, FixedTerm
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.bayes.weighing import Weighing
 from mapfilter.positioning.epochs import Epoch

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from mapfilter.positioning.bayes import device_step
+from mapfilter.positioning.bayes.beliefs import device_step
 
 ADDED = {
     "weigh_by_ways": -0.25, "weigh_by_serving": -1.0, "weigh_by_levels": -2.0,

@@ -8,8 +8,8 @@ from small_area import BANDS, COLS, OPTIONS, PIXEL_M, ROWS, make_area
 from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import Reason
 from mapfilter.models.street_motion import EAST, NORTH, STATES
-from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.bayes.radio import RadioSource
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
+from mapfilter.positioning.bayes.sources.radio import RadioSource
 from mapfilter.positioning.bayes.state import DeadReckoning
 from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.step_output import UnusedReading

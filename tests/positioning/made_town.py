@@ -12,7 +12,7 @@ import pandas as pd
 
 from mapfilter.database.field import RadioField
 from mapfilter.lattice import Lattice
-from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.area.area_map import AreaMap
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.tracks.log import make_log
 

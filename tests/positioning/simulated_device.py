@@ -25,15 +25,15 @@ from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
 from mapfilter.models.fingerprint import BoundReading
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.street_motion import MotionErrors
-from mapfilter.positioning.bayes.device_step import DeviceStep
-from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.first_hypotheses import Start
+from mapfilter.positioning.bayes.beliefs.device_step import DeviceStep
+from mapfilter.positioning.bayes.beliefs.first_hypotheses import Start
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.grid import StreetGrid
-from mapfilter.positioning.bayes.measured_model import MeasuredMapModel
-from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.sources.evidence import RadioReading
+from mapfilter.positioning.bayes.sources.measured_model import MeasuredMapModel
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.gnss.fixes import FixTerm
-from mapfilter.workflows import bench_device
+from mapfilter.workflows.benchmarks import device as bench_device
 
 assert config.ENABLE_CUDASIM
 DEVICE = Device("gpu", np)

@@ -10,8 +10,8 @@ from mapfilter.database.field import RadioField
 from mapfilter.lattice import Lattice
 from mapfilter.models.fingerprint import ServingWeights
 from mapfilter.models.level_errors import LevelErrors
-from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.evidence_options import EvidenceOptions
+from mapfilter.positioning.bayes.area.area_map import AreaMap
+from mapfilter.positioning.bayes.sources.evidence_options import EvidenceOptions
 from mapfilter.radio.cells import Cell, CellPlan
 
 ROWS, COLS, PIXEL_M = 7, 9, 10.0

@@ -10,14 +10,13 @@ import pytest
 from mapfilter.filters.contract import Status
 from mapfilter.filters.hypotheses import BeliefSummary
 from mapfilter.models.level_errors import LevelReport
-from mapfilter.positioning.bayes.alternative import (
+from mapfilter.positioning.bayes.rivals.alternative import (
     AlternativeHypothesis,
     AlternativeRules,
     NullHypothesis,
 )
-from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.hold import Hold
-from mapfilter.positioning.bayes.transitions import (
+from mapfilter.positioning.bayes.rivals.hold import Hold
+from mapfilter.positioning.bayes.rivals.transitions import (
     TRANSITIONS,
     Outcome,
     doubted,
@@ -25,6 +24,7 @@ from mapfilter.positioning.bayes.transitions import (
     report,
     resolve_alternative,
 )
+from mapfilter.positioning.bayes.sources.evidence import RadioReading
 
 RULES = AlternativeRules(
     start_log_odds=-3.0, search_threshold=4.0, lost_threshold=10.0, converge_log_odds=-5.0,

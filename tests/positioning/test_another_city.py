@@ -9,9 +9,9 @@ from made_town import Town, slowed, walk_log
 
 from mapfilter.filters.contract import Status
 from mapfilter.models.street_motion import OFF, STATES
-from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.sources.evidence import RadioReading
 from mapfilter.positioning.loop import locate
 
 CLAIMED = (Status.CONVERGED, Status.TRACKING)

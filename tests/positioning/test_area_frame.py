@@ -7,7 +7,7 @@ import pytest
 from small_area import FLOOR_DBM, LEVEL_DBM, make_area
 
 from mapfilter.lattice import Lattice
-from mapfilter.positioning.bayes.area_frame import (
+from mapfilter.positioning.bayes.area.area_frame import (
     AreaFrame,
     carriers_of,
     interfering_of,

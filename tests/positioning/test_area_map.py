@@ -8,7 +8,7 @@ import pytest
 
 from mapfilter.database.field import RadioField
 from mapfilter.lattice import Lattice
-from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.area.area_map import AreaMap
 from mapfilter.radio.cells import Cell, CellPlan
 
 LATTICE = Lattice("EPSG:32632", 0.0, 20.0, 10.0, 2, 3)

@@ -8,8 +8,8 @@ import pytest
 
 from mapfilter.database.cell_levels import CellLevels, NearestPoints, PartExtents
 from mapfilter.lattice import Lattice
-from mapfilter.positioning.bayes import area_tiles as tested
-from mapfilter.positioning.bayes.area_tiles import AreaTiles
+from mapfilter.positioning.bayes.area import area_tiles as tested
+from mapfilter.positioning.bayes.area.area_tiles import AreaTiles
 
 ROWS, COLS, SIDE = 5, 7, 3
 LATTICE = Lattice("EPSG:32632", 0.0, 100.0, 20.0, ROWS, COLS)

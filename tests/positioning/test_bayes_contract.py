@@ -13,15 +13,15 @@ from cross_world import CRS, EAST, WALK, make_database, walk_log, walk_tables
 from mapfilter.filters.contract import MotionStep, Reason, Status, UpdateInfo
 from mapfilter.filters.grid import GridFilter
 from mapfilter.filters.particle import ParticleFilter, ParticleOptions
-from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.area.opened_area import open_area
+from mapfilter.positioning.bayes.beliefs.first_hypotheses import Start
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.filter import BayesPositioner
-from mapfilter.positioning.bayes.first_hypotheses import Start
 from mapfilter.positioning.bayes.grid import StreetGrid
-from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.options import GridFilter as GridOptions
-from mapfilter.positioning.bayes.timing import TimingSource
+from mapfilter.positioning.bayes.sources.evidence import RadioReading
+from mapfilter.positioning.bayes.sources.timing import TimingSource
 from mapfilter.positioning.loop import estimate_of, locate
 from mapfilter.positioning.merging import epochs
 from mapfilter.positioning.step_output import UnusedReading

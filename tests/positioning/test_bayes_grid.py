@@ -11,10 +11,10 @@ from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.street_motion import MotionErrors
 from mapfilter.models.way_map import MapWeights
-from mapfilter.positioning.bayes.evidence_options import EvidenceOptions
+from mapfilter.positioning.bayes.area.opened_area import open_area
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.filter import BayesPositioner
-from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.sources.evidence_options import EvidenceOptions
 from mapfilter.positioning.merging import epochs
 from mapfilter.tracks.log import make_log
 

@@ -10,9 +10,9 @@ from made_town import Town
 from small_area import FLOOR_DBM, LATTICE, make_area
 
 from mapfilter.errors import ConfigError
-from mapfilter.positioning.bayes import opened_area
 from mapfilter.positioning.bayes import options as tested
 from mapfilter.positioning.bayes import over_survey as surveys
+from mapfilter.positioning.bayes.area import opened_area
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.radio.cells import CellPlan

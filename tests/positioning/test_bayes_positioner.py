@@ -10,9 +10,9 @@ from small_area import SOUTH_M, WEST_M, make_area
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.particle import ParticleOptions
-from mapfilter.positioning.bayes.evidence import EvidenceSource, EvidenceUpdate, FixedTerm
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.filter import BayesPositioner
-from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.sources.evidence import EvidenceSource, EvidenceUpdate, FixedTerm
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 
 FEW = ParticleOptions(max_particles=300, min_search_particles=200, min_particles=100)

@@ -11,9 +11,9 @@ from true_places import error_m
 from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Status
 from mapfilter.filters.particle import ParticleOptions
-from mapfilter.positioning.bayes.alternative import AlternativeRules, NullHypothesis
-from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.area.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.rivals.alternative import AlternativeRules, NullHypothesis
 from mapfilter.positioning.loop import locate
 from mapfilter.positioning.merging import epochs
 

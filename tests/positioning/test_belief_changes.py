@@ -13,10 +13,10 @@ from mapfilter.filters.grid import GridBelief
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.street_motion import BIAS, NORTH, STATES, MotionErrors
-from mapfilter.positioning.bayes.belief_changes import carried_on, remounted, turned_at_jump
-from mapfilter.positioning.bayes.belief_filters import BeliefFilters
-from mapfilter.positioning.bayes.hold_rules import HoldRules
-from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.beliefs.belief_changes import carried_on, remounted, turned_at_jump
+from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
+from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
 from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.sensors.rest import Rest

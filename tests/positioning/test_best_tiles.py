@@ -10,10 +10,10 @@ import pytest
 from mapfilter.lattice import Lattice
 from mapfilter.models.fingerprint import BoundReading
 from mapfilter.models.level_errors import LevelErrors, LevelReport
-from mapfilter.positioning.bayes import tile_search
-from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.tile_parts import LevelRange
-from mapfilter.positioning.bayes.tile_search import SearchedTiles, places_of, searched_tiles
+from mapfilter.positioning.bayes.area import tile_search
+from mapfilter.positioning.bayes.area.tile_parts import LevelRange
+from mapfilter.positioning.bayes.area.tile_search import SearchedTiles, places_of, searched_tiles
+from mapfilter.positioning.bayes.sources.evidence import RadioReading
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.gnss.fixes import FixTerm
 

@@ -14,11 +14,11 @@ from mapfilter.lattice import Lattice
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.street_motion import EAST, NORTH, OFF, STATES, MotionErrors
 from mapfilter.models.way_map import MapWeights
-from mapfilter.positioning.bayes.beyond_edge import beyond_edge
-from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.first_hypotheses import Start
-from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.area.beyond_edge import beyond_edge
+from mapfilter.positioning.bayes.beliefs.first_hypotheses import Start
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.sources.evidence import RadioReading
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.loop import locate
 

@@ -9,7 +9,7 @@ import pytest
 from cross_world import WALK, make_database, walk_log
 
 import mapfilter as mf
-from mapfilter.positioning.bayes.alternative import AlternativeRules
+from mapfilter.positioning.bayes.rivals.alternative import AlternativeRules
 
 LTE_M = 299_792_458 / 30.72e6 * 8
 

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from mapfilter.positioning.bayes.alternative import AlternativeRules
-from mapfilter.positioning.bayes.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.rivals.alternative import AlternativeRules
 from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.sensors.undirected import UndirectedWay

@@ -10,8 +10,8 @@ from small_area import BANDS, LEVEL_DBM, OPTIONS, PIXEL_M, ROWS, make_area
 from mapfilter.filters.belief_models import Cloud
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.street_motion import EAST, NORTH, STATES
-from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
+from mapfilter.positioning.bayes.sources.evidence import RadioReading
 
 ROTATED = BANDS["B"]
 SOUND = tuple(band for name, band in BANDS.items() if name != "B")

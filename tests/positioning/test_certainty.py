@@ -9,11 +9,11 @@ from made_town import Town
 
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, AlternativeRules
 from mapfilter.positioning.bayes.certainty import Recovery, _share_near, certainty
-from mapfilter.positioning.bayes.held import HeldOtherwise
-from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, AlternativeRules
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
+from mapfilter.positioning.bayes.rivals.hold import Hold
 
 RULES = AlternativeRules()
 BINS = Bins.over((0.0, 0.0, 2000.0, 2000.0))

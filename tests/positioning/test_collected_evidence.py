@@ -22,12 +22,12 @@ from made_filters import (
 )
 
 from mapfilter.filters.contract import Status
-from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm
-from mapfilter.positioning.bayes.held import HeldOtherwise
-from mapfilter.positioning.bayes.hold import Hold
-from mapfilter.positioning.bayes.mirrored import MirroredTwin
-from mapfilter.positioning.bayes.new_beliefs import NewBeliefs
-from mapfilter.positioning.bayes.rivals import Rivals
+from mapfilter.positioning.bayes.beliefs.new_beliefs import NewBeliefs
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
+from mapfilter.positioning.bayes.rivals.hold import Hold
+from mapfilter.positioning.bayes.rivals.mirrored import MirroredTwin
+from mapfilter.positioning.bayes.rivals.rivals import Rivals
+from mapfilter.positioning.bayes.sources.evidence import EvidenceUpdate, FixedTerm
 from mapfilter.positioning.bayes.weighing import Weighing, weighed_by
 from mapfilter.positioning.epochs import Epoch, ReportRow
 

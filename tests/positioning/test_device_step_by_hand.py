@@ -14,10 +14,10 @@ from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.models import level_memory
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.way_map import MapWeights
-from mapfilter.positioning.bayes import device_step
-from mapfilter.positioning.bayes.device_step import DeviceStep
-from mapfilter.positioning.bayes.evidence import FixedTerm, RadioReading
-from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.beliefs import device_step
+from mapfilter.positioning.bayes.beliefs.device_step import DeviceStep
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
+from mapfilter.positioning.bayes.sources.evidence import FixedTerm, RadioReading
 
 AREA = make_area()
 WEIGHTS = MapWeights(weight_per_m=0.1, off_cost_per_m=0.2)

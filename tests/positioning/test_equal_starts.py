@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from cross_world import make_database, walk_log
 
-from mapfilter.positioning.bayes.evidence import FixedTerm
-from mapfilter.positioning.bayes.likely_points import (
+from mapfilter.positioning.bayes.area.likely_points import (
     KEPT_REPORTS,
     known_reading,
     likelihoods,
     likelihoods_on_ways,
 )
-from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.area.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.bayes.radio import RadioSource
+from mapfilter.positioning.bayes.sources.evidence import FixedTerm
+from mapfilter.positioning.bayes.sources.radio import RadioSource
 from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.loop import locate
 

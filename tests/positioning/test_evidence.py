@@ -6,9 +6,9 @@ from cross_world import make_database
 from small_area import make_area
 
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.positioning.bayes.evidence_options import EvidenceOptions
-from mapfilter.positioning.bayes.opened_area import open_area
-from mapfilter.positioning.bayes.radio import RadioSource
+from mapfilter.positioning.bayes.area.opened_area import open_area
+from mapfilter.positioning.bayes.sources.evidence_options import EvidenceOptions
+from mapfilter.positioning.bayes.sources.radio import RadioSource
 from mapfilter.positioning.bayes.state import DeadReckoning
 from mapfilter.positioning.epochs import Epoch, ReportRow
 

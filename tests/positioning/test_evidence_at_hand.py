@@ -12,11 +12,11 @@ from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief, ParticleOptions
 from mapfilter.models.street_motion import BIAS, EAST, NORTH, STATES, MotionErrors
 from mapfilter.models.way_map import MapWeights
-from mapfilter.positioning.bayes.alternative import AlternativeRules
-from mapfilter.positioning.bayes.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters, carriageway_filters
-from mapfilter.positioning.bayes.hold_rules import HoldRules
-from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.rivals.alternative import AlternativeRules
+from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
 from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.positioning.gnss.state import GnssState
 

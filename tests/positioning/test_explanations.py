@@ -13,10 +13,10 @@ from scipy.special import logsumexp
 from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import Status
 from mapfilter.models.street_motion import STATES
-from mapfilter.positioning.bayes.alternative import AlternativeHypothesis
-from mapfilter.positioning.bayes.area_frame import BELOW_FLOOR_DB
-from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.area.area_frame import BELOW_FLOOR_DB
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.filter import Hypotheses
 from mapfilter.positioning.loop import locate

@@ -38,10 +38,10 @@ from mapfilter.models.street_motion import (
     MotionErrors,
 )
 from mapfilter.models.way_map import MapWeights
-from mapfilter.positioning.bayes.first_hypotheses import Start
+from mapfilter.positioning.bayes.beliefs.first_hypotheses import Start
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.grid import StreetGrid
-from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.bayes.radio import RadioSource
+from mapfilter.positioning.bayes.sources.radio import RadioSource
 from mapfilter.positioning.epochs import Epoch, ReportRow
 
 AREA = make_area()

@@ -17,7 +17,7 @@ from mapfilter.models.street_motion import (
     STRETCH,
     TURN,
 )
-from mapfilter.positioning.bayes import first_hypotheses as first
+from mapfilter.positioning.bayes.beliefs import first_hypotheses as first
 
 MOTION = SimpleNamespace(
     bias_sd_rad=0.3, scale_sd=0.1, turn_sd_rad=0.2, stretch_sd=0.05, rate_rad_per_m=0.004,

@@ -6,7 +6,7 @@ from math import cos, inf, pi, radians, sin
 import numpy as np
 import pytest
 
-from mapfilter.positioning.bayes.path import DeadReckoning
+from mapfilter.positioning.bayes.beliefs.path import DeadReckoning
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.gnss.trail import Contradiction, FixTrail
 from mapfilter.serving.state_file import decode, encode

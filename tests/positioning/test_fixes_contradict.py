@@ -10,12 +10,12 @@ from made_filters import STATE, UPDATES, Beliefs, belief, rival, weighed
 from made_town import CRS, Town, walk_log
 
 from mapfilter.filters.contract import Status
-from mapfilter.positioning.bayes.alternative import AlternativeRules
-from mapfilter.positioning.bayes.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.certainty import certainty
-from mapfilter.positioning.bayes.contradicted import hold_of_next, misreads
-from mapfilter.positioning.bayes.hold import Hold
 from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.rivals.alternative import AlternativeRules
+from mapfilter.positioning.bayes.rivals.contradicted import hold_of_next, misreads
+from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.positioning.gnss.state import GnssState

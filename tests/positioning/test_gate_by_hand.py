@@ -11,7 +11,7 @@ from mapfilter.filters.particle import ParticleBelief
 from mapfilter.geodesy import project
 from mapfilter.gnss.sky import GridFrame
 from mapfilter.models.street_motion import EAST, NORTH, STATES
-from mapfilter.positioning.bayes.evidence import FixedTerm
+from mapfilter.positioning.bayes.sources.evidence import FixedTerm
 from mapfilter.positioning.epochs import Epoch, Pseudorange
 from mapfilter.positioning.gnss.gate import GnssComparison, GnssGate, _neutral
 from mapfilter.positioning.gnss.options import GnssOptions

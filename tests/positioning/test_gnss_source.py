@@ -10,8 +10,8 @@ import pytest
 from mapfilter.filters.contract import Reason
 from mapfilter.geodesy import project
 from mapfilter.gnss.sky import GridFrame
-from mapfilter.positioning.bayes.alternative import AlternativeHypothesis
-from mapfilter.positioning.bayes.path import DeadReckoning
+from mapfilter.positioning.bayes.beliefs.path import DeadReckoning
+from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis
 from mapfilter.positioning.epochs import Epoch, GnssFix, Pseudorange
 from mapfilter.positioning.gnss.gate import GnssComparison
 from mapfilter.positioning.gnss.options import GnssOptions

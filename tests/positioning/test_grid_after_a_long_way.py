@@ -7,7 +7,7 @@ import pytest
 from cross_world import LATTICE, STREET_ROW, make_database
 
 from mapfilter.filters.contract import MotionStep
-from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.area.opened_area import open_area
 from mapfilter.positioning.bayes.options import GridFilter
 from mapfilter.positioning.epochs import Epoch, GnssFix
 

@@ -14,8 +14,8 @@ from mapfilter._device import PROCESSOR, Device, on_host
 from mapfilter.errors import ConfigError
 from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.grid import GridBelief
-from mapfilter.positioning.bayes.device_step import DeviceStep
-from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.area.opened_area import open_area
+from mapfilter.positioning.bayes.beliefs.device_step import DeviceStep
 from mapfilter.positioning.bayes.options import GridFilter
 from mapfilter.positioning.loop import locate
 from mapfilter.positioning.merging import epochs

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mapfilter.database.cell_levels import CellLevels, NearestPoints
-from mapfilter.positioning.bayes.bounded_cache import BoundedCache
-from mapfilter.positioning.bayes.tile_parts import Reaching, Tile
+from mapfilter.positioning.bayes.area.bounded_cache import BoundedCache
+from mapfilter.positioning.bayes.area.tile_parts import Reaching, Tile
 
 
 def test_bytes_of_levels():

@@ -10,9 +10,9 @@ from small_area import HEIGHT_M, ON_WAY, SOUTH_M, WEST_M, WIDTH_M, make_area
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.models.street_motion import STATES, STRETCH, TURN, MotionErrors
-from mapfilter.positioning.bayes.hold import Hold
-from mapfilter.positioning.bayes.path import DeadReckoning
-from mapfilter.positioning.bayes.smoothing import BayesSmoother, Kept
+from mapfilter.positioning.bayes.beliefs.path import DeadReckoning
+from mapfilter.positioning.bayes.beliefs.smoothing import BayesSmoother, Kept
+from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.estimate_columns import EstimateColumns
 from mapfilter.positioning.step_output import Fix, StepOutput

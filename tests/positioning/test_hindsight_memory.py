@@ -10,10 +10,10 @@ from small_area import make_area
 
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.street_motion import STATES, MotionErrors
-from mapfilter.positioning.bayes import smoothing
-from mapfilter.positioning.bayes.hold import Hold
-from mapfilter.positioning.bayes.path import DeadReckoning
-from mapfilter.positioning.bayes.smoothing import BayesSmoother
+from mapfilter.positioning.bayes.beliefs import smoothing
+from mapfilter.positioning.bayes.beliefs.path import DeadReckoning
+from mapfilter.positioning.bayes.beliefs.smoothing import BayesSmoother
+from mapfilter.positioning.bayes.rivals.hold import Hold
 
 COUNT = 10
 KEPT_BYTES = COUNT * (5 * 4 + 4)

@@ -11,7 +11,7 @@ from scipy.stats import norm
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.fingerprint import BoundReading
-from mapfilter.positioning.bayes.evidence import (
+from mapfilter.positioning.bayes.sources.evidence import (
     EvidenceUpdate,
     FixedTerm,
     RadioReading,

@@ -9,13 +9,13 @@ import pytest
 
 from mapfilter.models.fingerprint import BoundReading
 from mapfilter.models.level_errors import LevelReport
-from mapfilter.positioning.bayes import likely_points as tested
-from mapfilter.positioning.bayes.evidence import FixedTerm, RadioReading
-from mapfilter.positioning.bayes.likely_points import (
+from mapfilter.positioning.bayes.area import likely_points as tested
+from mapfilter.positioning.bayes.area.likely_points import (
     known_reading,
     likelihoods,
     likelihoods_on_ways,
 )
+from mapfilter.positioning.bayes.sources.evidence import FixedTerm, RadioReading
 
 POINTS = np.array([[10.0, 20.0, 30.0, 40.0, 50.0], [1.0, 2.0, 3.0, 4.0, 5.0]], dtype=np.float32)
 NATS = {10.0: -700.0, 20.0: -701.0, 30.0: -705.0, 40.0: -702.0, 50.0: -703.0}

@@ -9,10 +9,10 @@ from mapfilter.lattice import Lattice
 from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.models.level_memory import SLOTS
 from mapfilter.models.street_motion import STATES
-from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.evidence_options import EvidenceOptions
-from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.area.area_map import AreaMap
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
+from mapfilter.positioning.bayes.sources.evidence import RadioReading
+from mapfilter.positioning.bayes.sources.evidence_options import EvidenceOptions
 
 SIDE, PIXEL_M, CELLS = 6, 10.0, 30
 LATTICE = Lattice("EPSG:32629", 500_000.0, 4_500_060.0, PIXEL_M, SIDE, SIDE)

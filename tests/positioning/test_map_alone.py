@@ -15,10 +15,10 @@ from mapfilter.angles import wrap_rad
 from mapfilter.database.build import build_roads
 from mapfilter.database.sources import LayerRoutes
 from mapfilter.filters.contract import MotionStep, Reason, Status
-from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.area.opened_area import open_area
+from mapfilter.positioning.bayes.beliefs.path import LEG_M, PATH_M, RecentPath
+from mapfilter.positioning.bayes.beliefs.path_start import ends_of_path, possible_turns_rad
 from mapfilter.positioning.bayes.options import VEHICLE, BayesFilter
-from mapfilter.positioning.bayes.path import LEG_M, PATH_M, RecentPath
-from mapfilter.positioning.bayes.path_start import ends_of_path, possible_turns_rad
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.loop import locate
 from mapfilter.positioning.merging import epochs

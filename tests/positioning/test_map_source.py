@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import pytest
 
 from mapfilter.filters.contract import MotionStep
-from mapfilter.positioning.bayes.map_source import MapSource
-from mapfilter.positioning.bayes.path import DeadReckoning, RecentPath
+from mapfilter.positioning.bayes.beliefs.path import DeadReckoning, RecentPath
+from mapfilter.positioning.bayes.sources.map_source import MapSource
 from mapfilter.positioning.epochs import Epoch
 
 EPOCH = Epoch(1.0)

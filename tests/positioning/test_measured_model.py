@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from small_area import ON_WAY, OPTIONS, make_area
 
-from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.measured_model import MeasuredMapModel
+from mapfilter.positioning.bayes.sources.evidence import RadioReading
+from mapfilter.positioning.bayes.sources.measured_model import MeasuredMapModel
 
 AREA = make_area()
 

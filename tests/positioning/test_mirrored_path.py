@@ -17,11 +17,11 @@ from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.lattice import Lattice
-from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.mirrored import MirroredTwin, MirrorRules, mirrored_step
-from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.area.area_map import AreaMap
+from mapfilter.positioning.bayes.area.opened_area import open_area
+from mapfilter.positioning.bayes.beliefs.path import RecentPath
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.bayes.path import RecentPath
+from mapfilter.positioning.bayes.rivals.mirrored import MirroredTwin, MirrorRules, mirrored_step
 from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.positioning.gnss.state import GnssState
 from mapfilter.positioning.merging import epochs

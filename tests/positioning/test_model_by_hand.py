@@ -11,8 +11,8 @@ from small_area import HEIGHT_M, OPTIONS, WIDTH_M
 from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.models.way_map import MapWeights
-from mapfilter.positioning.bayes.evidence import FixedTerm, RadioReading
-from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
+from mapfilter.positioning.bayes.sources.evidence import FixedTerm, RadioReading
 
 TERM = FixedTerm(np.array([-1.5]))
 

@@ -13,11 +13,11 @@ from mapfilter.filters.hypotheses import BeliefSummary
 from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.level_kernels import Prediction
 from mapfilter.models.street_motion import OFF, STATES
-from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.first_hypotheses import Start, first_hypotheses
-from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.bayes.sampled_cells import expected_absent, mean_rough_db2
-from mapfilter.positioning.bayes.tiled_area import TiledArea
+from mapfilter.positioning.bayes.area.tiled_area import TiledArea
+from mapfilter.positioning.bayes.beliefs.first_hypotheses import Start, first_hypotheses
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
+from mapfilter.positioning.bayes.sources.evidence import RadioReading
+from mapfilter.positioning.bayes.sources.sampled_cells import expected_absent, mean_rough_db2
 
 
 @pytest.mark.parametrize("known", [True, False])

@@ -13,12 +13,12 @@ from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.street_motion import BIAS, EAST, NORTH, STATES
-from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
-from mapfilter.positioning.bayes.held import HeldOtherwise
-from mapfilter.positioning.bayes.hold import Hold
-from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
-from mapfilter.positioning.bayes.mirrored import MirroredTwin
-from mapfilter.positioning.bayes.moving import moved
+from mapfilter.positioning.bayes.beliefs.moving import moved
+from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, NullHypothesis
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
+from mapfilter.positioning.bayes.rivals.hold import Hold
+from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules, PullRules
+from mapfilter.positioning.bayes.rivals.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch, GnssFix, Pseudorange
 from mapfilter.positioning.sensors.pace import Pace
@@ -111,7 +111,7 @@ def walking(main=None, *, status=TRACKING, stepped_s=9.0, **more):
 
 def moved_by(beliefs, *given):
     changes = {name: getattr(beliefs, name) for name in CHANGES}
-    with patch.multiple("mapfilter.positioning.bayes.moving", **changes):
+    with patch.multiple("mapfilter.positioning.bayes.beliefs.moving", **changes):
         return moved(beliefs, *given)
 
 

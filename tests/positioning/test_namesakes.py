@@ -10,9 +10,9 @@ from made_town import CRS, FLOOR_DBM, NAMES, WEST_M, Town, slowed, walk_log
 from mapfilter.database.field import RadioField
 from mapfilter.filters.contract import Status
 from mapfilter.models.fingerprint import BoundReading, bound_table, weigh_by_bound
-from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.evidence import RadioReading, bound_under_null
+from mapfilter.positioning.bayes.area.area_map import AreaMap
 from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.sources.evidence import RadioReading, bound_under_null
 from mapfilter.positioning.merging import epochs
 from mapfilter.radio.cells import Cell, CellPlan
 

@@ -11,7 +11,7 @@ import pytest
 from made_town import CRS, FLOOR_DBM, NAMES, Town, slowed, walk_log
 
 from mapfilter.database.field import RadioField
-from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.area.area_map import AreaMap
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.estimate import Status
 from mapfilter.positioning.loop import locate

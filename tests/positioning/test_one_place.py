@@ -12,10 +12,10 @@ from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes import claims
 from mapfilter.positioning.bayes.certainty import Recovery
-from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm
-from mapfilter.positioning.bayes.held import HeldOtherwise
-from mapfilter.positioning.bayes.hold import Hold
-from mapfilter.positioning.bayes.timing import TimingState, TimingTerm
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
+from mapfilter.positioning.bayes.rivals.hold import Hold
+from mapfilter.positioning.bayes.sources.evidence import EvidenceUpdate, FixedTerm
+from mapfilter.positioning.bayes.sources.timing import TimingState, TimingTerm
 from mapfilter.positioning.bayes.weighing import Weighing, weighed_by
 from mapfilter.positioning.epochs import Epoch, ReportRow
 

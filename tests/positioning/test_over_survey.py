@@ -17,7 +17,6 @@ from mapfilter.filters.belief_models import Cloud
 from mapfilter.lattice import Lattice
 from mapfilter.models.measured_map import MeasuredMapOptions
 from mapfilter.models.street_motion import EAST, NORTH, STATES
-from mapfilter.positioning.bayes.measured_model import MeasuredMapModel
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.bayes.over_survey import (
     SurveyedEvidence,
@@ -25,7 +24,8 @@ from mapfilter.positioning.bayes.over_survey import (
     over_survey,
     site_of,
 )
-from mapfilter.positioning.bayes.radio import RadioSource
+from mapfilter.positioning.bayes.sources.measured_model import MeasuredMapModel
+from mapfilter.positioning.bayes.sources.radio import RadioSource
 from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.fingerprints.locating import fit_locator
 from mapfilter.positioning.fingerprints.sources import reports_of_database

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mapfilter.positioning.bayes.maker import Maker
-from mapfilter.positioning.bayes.own_draws import OwnDraws, Purpose, own_rng
+from mapfilter.positioning.bayes.rivals.own_draws import OwnDraws, Purpose, own_rng
 
 
 @pytest.mark.parametrize(

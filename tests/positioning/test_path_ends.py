@@ -10,8 +10,8 @@ from small_area import COLS, DISTANCE_M, PIXEL_M, POINTS, ROWS, make_area
 
 from mapfilter.filters.contract import MotionStep
 from mapfilter.models.way_map import MapWeights
-from mapfilter.positioning.bayes.path import DeadReckoning, RecentPath
-from mapfilter.positioning.bayes.path_start import ends_of_path, possible_turns_rad
+from mapfilter.positioning.bayes.beliefs.path import DeadReckoning, RecentPath
+from mapfilter.positioning.bayes.beliefs.path_start import ends_of_path, possible_turns_rad
 
 AREA = make_area()
 WEIGHTS = MapWeights(

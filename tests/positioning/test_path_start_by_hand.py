@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mapfilter.positioning.bayes import path_start
+from mapfilter.positioning.bayes.beliefs import path_start
 
 POINTS = np.array([[5.0, 25.0], [15.0, 35.0]], dtype=np.float32)
 AREA = SimpleNamespace(

@@ -12,11 +12,11 @@ from true_places import error_m
 from mapfilter.angles import wrap_rad
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.particle import UpdateInfo
-from mapfilter.positioning.bayes import own_draws
-from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, NullHypothesis
+from mapfilter.positioning.bayes.beliefs.new_beliefs import NewBeliefs
 from mapfilter.positioning.bayes.certainty import Recovery
-from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.held import (
+from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, NullHypothesis
+from mapfilter.positioning.bayes.rivals.held import (
     HeldOtherwise,
     after_takeover,
     is_ahead,
@@ -24,12 +24,12 @@ from mapfilter.positioning.bayes.held import (
     still_open,
     winner,
 )
-from mapfilter.positioning.bayes.hold import Hold
-from mapfilter.positioning.bayes.hold_rules import HoldRules
-from mapfilter.positioning.bayes.mirrored import MirroredTwin
-from mapfilter.positioning.bayes.new_beliefs import NewBeliefs
-from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.bayes.own_draws import own_rng
+from mapfilter.positioning.bayes.rivals.hold import Hold
+from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
+from mapfilter.positioning.bayes.rivals.mirrored import MirroredTwin
+from mapfilter.positioning.bayes.rivals.own_draws import own_rng
+from mapfilter.positioning.bayes.rivals.rivals import own_draws
+from mapfilter.positioning.bayes.sources.evidence import RadioReading
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.merging import epochs
 from mapfilter.serving.state_file import decode, encode

@@ -11,13 +11,13 @@ from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.street_motion import BIAS
 from mapfilter.positioning.bayes import filter as tested
-from mapfilter.positioning.bayes import usable
-from mapfilter.positioning.bayes.alternative import NullHypothesis
-from mapfilter.positioning.bayes.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.filter import BayesPositioner
-from mapfilter.positioning.bayes.hold import Hold
-from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.rivals.alternative import NullHypothesis
+from mapfilter.positioning.bayes.rivals.hold import Hold
+from mapfilter.positioning.bayes.sources import usable
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.undirected import UndirectedWay

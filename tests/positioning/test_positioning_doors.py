@@ -15,23 +15,23 @@ from mapfilter.models.fingerprint import ServingWeights
 from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.street_motion import MotionErrors
 from mapfilter.models.way_map import MapWeights
-from mapfilter.positioning.bayes.alternative import (
+from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
+from mapfilter.positioning.bayes.rivals.alternative import (
     AlternativeHypothesis,
     AlternativeRules,
     NullHypothesis,
 )
-from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.evidence_options import EvidenceOptions
-from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
-from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
-from mapfilter.positioning.bayes.timing import TimingState
-from mapfilter.positioning.bayes.transitions import (
+from mapfilter.positioning.bayes.rivals.transitions import (
     TRANSITIONS,
     Outcome,
     judge,
     report,
     resolve_alternative,
 )
+from mapfilter.positioning.bayes.sources.evidence import RadioReading
+from mapfilter.positioning.bayes.sources.evidence_options import EvidenceOptions
+from mapfilter.positioning.bayes.sources.timing import TimingState
+from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.state import GnssState

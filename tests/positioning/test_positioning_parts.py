@@ -17,9 +17,9 @@ from mapfilter.models.ranging import pseudoranges, timing_advances
 from mapfilter.models.state import POSITION, POSITION_CLOCK_3D
 from mapfilter.models.street_motion import MotionErrors
 from mapfilter.models.way_map import MapWeights
-from mapfilter.positioning.bayes.first_hypotheses import Start
+from mapfilter.positioning.bayes.beliefs.first_hypotheses import Start
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.grid import StreetGrid
-from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.state import BayesState, DeadReckoning
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow, headed
 from mapfilter.positioning.gnss.fixes import FixTerm, refutation, widened

@@ -22,17 +22,17 @@ from made_filters import (
 from made_town import CRS, Town, walk_log
 
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.bayes.alternative import NullHypothesis
-from mapfilter.positioning.bayes.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.doubted import positions_in_doubt
-from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm, RadioReading
-from mapfilter.positioning.bayes.held import HeldOtherwise
-from mapfilter.positioning.bayes.hold import Hold
-from mapfilter.positioning.bayes.hold_rules import PullRules
 from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.rivals.alternative import NullHypothesis
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
+from mapfilter.positioning.bayes.rivals.hold import Hold
+from mapfilter.positioning.bayes.rivals.hold_rules import PullRules
+from mapfilter.positioning.bayes.rivals.unaided import beside_alternative
+from mapfilter.positioning.bayes.sources.evidence import EvidenceUpdate, FixedTerm, RadioReading
 from mapfilter.positioning.bayes.state import BayesState
-from mapfilter.positioning.bayes.unaided import beside_alternative
 from mapfilter.positioning.epochs import Epoch, GnssFix, Pseudorange
 from mapfilter.positioning.gnss.fixes import agrees_with
 from mapfilter.positioning.gnss.gate import GnssComparison, GnssGate, _neutral

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mapfilter.filters.contract import MotionStep
-from mapfilter.positioning.bayes.path import LEG_M, PATH_M, DeadReckoning, RecentPath
+from mapfilter.positioning.bayes.beliefs.path import LEG_M, PATH_M, DeadReckoning, RecentPath
 
 
 def after(*steps, path=None):

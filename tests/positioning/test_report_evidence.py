@@ -34,8 +34,8 @@ from small_area import (
 
 from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
+from mapfilter.positioning.bayes.sources.evidence import RadioReading
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.gnss.source import FirstFix
 

@@ -24,9 +24,9 @@ from made_radio import (
 from small_area import CARRIERS, FLOOR_DBM, OPTIONS
 
 from mapfilter.filters.contract import MotionStep, Reason
-from mapfilter.positioning.bayes.evidence_options import EvidenceOptions
-from mapfilter.positioning.bayes.path import DeadReckoning
-from mapfilter.positioning.bayes.radio import RadioSource
+from mapfilter.positioning.bayes.beliefs.path import DeadReckoning
+from mapfilter.positioning.bayes.sources.evidence_options import EvidenceOptions
+from mapfilter.positioning.bayes.sources.radio import RadioSource
 from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.step_output import UnusedReading
 

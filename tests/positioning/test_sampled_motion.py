@@ -11,12 +11,12 @@ from cross_world import CRS, make_database
 from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.filters.grid import GridFilter
 from mapfilter.models.street_motion import STATES, MotionErrors, move
-from mapfilter.positioning.bayes.first_hypotheses import Start
+from mapfilter.positioning.bayes.area.opened_area import open_area
+from mapfilter.positioning.bayes.beliefs.first_hypotheses import Start
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
+from mapfilter.positioning.bayes.beliefs.path import DeadReckoning
 from mapfilter.positioning.bayes.grid import StreetGrid
-from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.bayes.path import DeadReckoning
 from mapfilter.positioning.epochs import Epoch, headed
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.kalman.reckoning import Reckoning

@@ -11,11 +11,11 @@ from sky_world import HEIGHTS, START_UTC_S, no_rows, sky_log, sky_table
 from true_places import error_m
 
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.bayes.alternative import NullHypothesis
-from mapfilter.positioning.bayes.held import HeldOtherwise
-from mapfilter.positioning.bayes.hold import Hold
-from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.area.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
+from mapfilter.positioning.bayes.rivals.alternative import NullHypothesis
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
+from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.gnss.receiver import carried
 from mapfilter.positioning.loop import estimate_of, locate

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from small_area import SOUTH_M, WEST_M, make_area
 
-from mapfilter.positioning.bayes import smoothing
-from mapfilter.positioning.bayes.smoothing import BayesSmoother, Kept
+from mapfilter.positioning.bayes.beliefs import smoothing
+from mapfilter.positioning.bayes.beliefs.smoothing import BayesSmoother, Kept
 
 AREA = make_area()
 STILL = SimpleNamespace(

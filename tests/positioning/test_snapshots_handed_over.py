@@ -7,7 +7,7 @@ import pytest
 from cross_world import EAST, NORTH, make_database, walk_log
 
 from mapfilter.filters.contract import Status
-from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.area.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.loop import locate

@@ -9,7 +9,7 @@ import pytest
 from cross_world import make_database, walk_log
 
 from mapfilter.positioning.bayes import state as bayes_state
-from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.area.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.loop import locate
 from mapfilter.positioning.merging import epochs

@@ -12,8 +12,8 @@ from mapfilter.errors import InputError
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.geodesy import unproject
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.filter import BayesPositioner
-from mapfilter.positioning.bayes.model import BayesModel
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epoch_checks import check_epoch
 from mapfilter.positioning.epochs import Difference, Epoch, GnssFix, Pseudorange, ReportRow

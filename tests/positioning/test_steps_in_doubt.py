@@ -10,10 +10,10 @@ from made_town import Town, slowed, walk_log
 from true_places import error_m
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
-from mapfilter.positioning.bayes.belief_changes import carried_on
-from mapfilter.positioning.bayes.hold import Hold
+from mapfilter.positioning.bayes.beliefs.belief_changes import carried_on
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.bayes.step_units import (
+from mapfilter.positioning.bayes.rivals.hold import Hold
+from mapfilter.positioning.bayes.rivals.step_units import (
     asks_for_unit,
     hold_after_takeover,
     is_unit_open,
@@ -27,8 +27,8 @@ from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.watch import SensorWatch
 from mapfilter.positioning.sensors.watching import watched
 from mapfilter.serving.state_file import decode, encode
+from mapfilter.tracks.checks.speeds import speed_fault
 from mapfilter.tracks.log import make_log
-from mapfilter.tracks.speeds import speed_fault
 
 CELLS = tuple("ABCDEFG")
 FOOT_M = 0.3048

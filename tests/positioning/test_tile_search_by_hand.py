@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mapfilter.positioning.bayes.tile_search import (
+from mapfilter.positioning.bayes.area.tile_search import (
     SearchedTiles,
     _at_places,
     _gains_of_terms,

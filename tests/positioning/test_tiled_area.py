@@ -22,20 +22,20 @@ from mapfilter.lattice import Lattice
 from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.models.street_motion import STATES
 from mapfilter.models.way_map import interpolate
-from mapfilter.positioning.bayes import opened_area
-from mapfilter.positioning.bayes.area_map import AreaMap
-from mapfilter.positioning.bayes.area_tiles import HELD_BYTES
-from mapfilter.positioning.bayes.bounded_cache import BoundedCache
-from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.opened_area import open_area
-from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
-from mapfilter.positioning.bayes.tile_search import (
+from mapfilter.positioning.bayes.area import opened_area
+from mapfilter.positioning.bayes.area.area_map import AreaMap
+from mapfilter.positioning.bayes.area.area_tiles import HELD_BYTES
+from mapfilter.positioning.bayes.area.bounded_cache import BoundedCache
+from mapfilter.positioning.bayes.area.opened_area import open_area
+from mapfilter.positioning.bayes.area.tile_search import (
     SearchedTiles,
     points_everywhere,
     searched_tiles,
 )
-from mapfilter.positioning.bayes.tiled_area import TiledArea
-from mapfilter.positioning.bayes.timing import TimingSource
+from mapfilter.positioning.bayes.area.tiled_area import TiledArea
+from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
+from mapfilter.positioning.bayes.sources.evidence import RadioReading
+from mapfilter.positioning.bayes.sources.timing import TimingSource
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.gnss.fixes import FixTerm
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import StoreError
-from mapfilter.positioning.bayes import tiled_area
-from mapfilter.positioning.bayes.tiled_area import TiledArea
+from mapfilter.positioning.bayes.area import tiled_area
+from mapfilter.positioning.bayes.area.tiled_area import TiledArea
 
 ROWS, COLS, SIDE = 4, 5, 2
 """Two rows of three tiles, of which the last column is narrower; pixels of 10 m."""

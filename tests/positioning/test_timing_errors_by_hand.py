@@ -8,8 +8,12 @@ import pytest
 
 from mapfilter.models.ranging import range_differences
 from mapfilter.models.state import StateLayout
-from mapfilter.positioning.bayes.timing import TimingState
-from mapfilter.positioning.bayes.timing_errors import FACTORS, DifferenceErrors, DifferenceTerm
+from mapfilter.positioning.bayes.sources.timing import TimingState
+from mapfilter.positioning.bayes.sources.timing_errors import (
+    FACTORS,
+    DifferenceErrors,
+    DifferenceTerm,
+)
 from mapfilter.serving.state_file import decode, encode
 
 

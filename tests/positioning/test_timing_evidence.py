@@ -9,10 +9,10 @@ import pytest
 from cross_world import CRS, LATTICE, make_database, walk_log
 
 from mapfilter.filters.contract import Reason
-from mapfilter.positioning.bayes.evidence import EvidenceUpdate
-from mapfilter.positioning.bayes.opened_area import open_area
+from mapfilter.positioning.bayes.area.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.bayes.timing import TimingSource, TimingState
+from mapfilter.positioning.bayes.sources.evidence import EvidenceUpdate
+from mapfilter.positioning.bayes.sources.timing import TimingSource, TimingState
 from mapfilter.positioning.epochs import Difference, Epoch, ReportRow
 from mapfilter.positioning.gnss.options import TimingOptions
 from mapfilter.positioning.loop import locate

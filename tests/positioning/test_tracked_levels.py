@@ -11,9 +11,9 @@ from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import Status
 from mapfilter.filters.particle import ParticleBelief, ParticleFilter, ParticleOptions
 from mapfilter.models.street_motion import STATES
-from mapfilter.positioning.bayes.evidence import FixedTerm
-from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.bayes.radio import RadioSource
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
+from mapfilter.positioning.bayes.sources.evidence import FixedTerm
+from mapfilter.positioning.bayes.sources.radio import RadioSource
 from mapfilter.positioning.bayes.state import DeadReckoning
 from mapfilter.positioning.epochs import Epoch, ReportRow
 

@@ -12,8 +12,8 @@ from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.street_motion import BIAS, STATES
-from mapfilter.positioning.bayes.alternative import NullHypothesis
-from mapfilter.positioning.bayes.held import (
+from mapfilter.positioning.bayes.rivals.alternative import NullHypothesis
+from mapfilter.positioning.bayes.rivals.held import (
     HeldOtherwise,
     after_takeover,
     as_measured,
@@ -23,9 +23,9 @@ from mapfilter.positioning.bayes.held import (
     still_open,
     winner,
 )
-from mapfilter.positioning.bayes.hold import Hold
-from mapfilter.positioning.bayes.hold_rules import HoldRules
-from mapfilter.positioning.bayes.own_draws import Purpose, own_rng
+from mapfilter.positioning.bayes.rivals.hold import Hold
+from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
+from mapfilter.positioning.bayes.rivals.own_draws import Purpose, own_rng
 
 RULES = HoldRules(
     jump_deg=60.0, around_deg=150.0, probability=0.01, around_probability=0.2, mirrored_odds=0.3,

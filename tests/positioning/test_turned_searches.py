@@ -13,9 +13,9 @@ from mapfilter.filters.contract import Status
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.street_motion import BIAS, STATES
-from mapfilter.positioning.bayes.belief_changes import turned_at_jump
-from mapfilter.positioning.bayes.hold_rules import HoldRules
+from mapfilter.positioning.bayes.beliefs.belief_changes import turned_at_jump
 from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
 from mapfilter.positioning.merging import epochs
 from mapfilter.tracks.log import make_log
 

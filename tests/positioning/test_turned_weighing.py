@@ -19,12 +19,12 @@ from made_filters import (
 )
 
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.bayes.alternative import NullHypothesis
 from mapfilter.positioning.bayes.certainty import Recovery
-from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm
-from mapfilter.positioning.bayes.held import HeldOtherwise
-from mapfilter.positioning.bayes.hold import Hold
-from mapfilter.positioning.bayes.mirrored import MirroredTwin
+from mapfilter.positioning.bayes.rivals.alternative import NullHypothesis
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
+from mapfilter.positioning.bayes.rivals.hold import Hold
+from mapfilter.positioning.bayes.rivals.mirrored import MirroredTwin
+from mapfilter.positioning.bayes.sources.evidence import EvidenceUpdate, FixedTerm
 
 
 def turned_phone(log_evidence, *, prior=-2.0, null=-6.0, status=TRACKING, start_m=0.0):

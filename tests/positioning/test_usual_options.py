@@ -4,9 +4,9 @@ from dataclasses import asdict
 
 import pytest
 
-from mapfilter.positioning.bayes.alternative import AlternativeRules
-from mapfilter.positioning.bayes.hold_rules import HoldRules
-from mapfilter.positioning.bayes.mirrored import MirrorRules
+from mapfilter.positioning.bayes.rivals.alternative import AlternativeRules
+from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
+from mapfilter.positioning.bayes.rivals.mirrored import MirrorRules
 from mapfilter.positioning.fingerprints.options import (
     CANDIDATES,
     Centroid,

@@ -24,13 +24,13 @@ from made_filters import (
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.grid import GridBelief
 from mapfilter.models.level_errors import LevelReport
-from mapfilter.positioning.bayes.alternative import NullHypothesis
+from mapfilter.positioning.bayes.beliefs.new_beliefs import NewBeliefs
+from mapfilter.positioning.bayes.beliefs.path import RecentPath
 from mapfilter.positioning.bayes.certainty import Recovery
-from mapfilter.positioning.bayes.evidence import EvidenceUpdate, FixedTerm, RadioReading
-from mapfilter.positioning.bayes.held import HeldOtherwise
-from mapfilter.positioning.bayes.hold import Hold
-from mapfilter.positioning.bayes.new_beliefs import NewBeliefs
-from mapfilter.positioning.bayes.path import RecentPath
+from mapfilter.positioning.bayes.rivals.alternative import NullHypothesis
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
+from mapfilter.positioning.bayes.rivals.hold import Hold
+from mapfilter.positioning.bayes.sources.evidence import EvidenceUpdate, FixedTerm, RadioReading
 from mapfilter.positioning.epochs import Epoch
 
 

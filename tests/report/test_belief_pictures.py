@@ -19,7 +19,7 @@ from mapfilter.report.errors import plot_error_over_distance
 from mapfilter.report.evidence import plot_evidence
 from mapfilter.report.saving import save
 from mapfilter.report.snapshots import plot_belief, story_bounds_m
-from mapfilter.workflows.track_pictures import choose_snapshots
+from mapfilter.workflows.outputs.track_pictures import choose_snapshots
 
 STREET = np.array([[0.0, 100.0], [400.0, 100.0]])
 BASE = BaseMap((0.0, 0.0, 400.0, 300.0), (STREET,))

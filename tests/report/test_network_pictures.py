@@ -22,10 +22,10 @@ from mapfilter.report.saving import png_of, save
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.route_points import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings
-from mapfilter.workflows import pictures as network_pictures
-from mapfilter.workflows import served
-from mapfilter.workflows.pictures import draw_network, land_use_of_map
-from mapfilter.workflows.served import best_servers, served_points, thinned_lattice
+from mapfilter.workflows.outputs import pictures as network_pictures
+from mapfilter.workflows.outputs import served
+from mapfilter.workflows.outputs.pictures import draw_network, land_use_of_map
+from mapfilter.workflows.outputs.served import best_servers, served_points, thinned_lattice
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385_000.0, 6_672_000.0, 5.0, 40, 50)

@@ -18,8 +18,8 @@ from mapfilter.survey.measured_map import fit_survey
 from mapfilter.survey.measurements import Measurements
 from mapfilter.survey.options import SurveyOptions
 from mapfilter.survey.survey_rasters import write_survey
-from mapfilter.workflows import served, survey_pictures
-from mapfilter.workflows.survey_pictures import SurveyEvidence, draw_survey
+from mapfilter.workflows.outputs import served, survey_pictures
+from mapfilter.workflows.outputs.survey_pictures import SurveyEvidence, draw_survey
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385_000.0, 6_672_000.0, 5.0, 40, 50)

@@ -15,10 +15,10 @@ from mapfilter.errors import ConfigError, StoreError
 from mapfilter.gnss.almanacs import nominal_gps
 from mapfilter.gnss.orbits import gps_time
 from mapfilter.models.street_motion import STATES
-from mapfilter.positioning.bayes.alternative import AlternativeHypothesis
-from mapfilter.positioning.bayes.held import HeldOtherwise
-from mapfilter.positioning.bayes.hold import Hold
-from mapfilter.positioning.bayes.mirrored import MirroredTwin
+from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
+from mapfilter.positioning.bayes.rivals.hold import Hold
+from mapfilter.positioning.bayes.rivals.mirrored import MirroredTwin
 from mapfilter.positioning.loop import locate as replay
 from mapfilter.positioning.merging import epochs
 from mapfilter.serving import sessions as sessions_module

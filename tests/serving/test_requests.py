@@ -25,7 +25,7 @@ from mapfilter.serving.epoch_rows import read_epochs
 from mapfilter.serving.geolocate import geolocator
 from mapfilter.serving.limits import RateLimit
 from mapfilter.serving.places import placeless_note
-from mapfilter.tracks.identify import name_by_plan
+from mapfilter.tracks.joining.identify import name_by_plan
 from mapfilter.tracks.log import make_log
 
 TOKEN = "0123456789abcdef"

@@ -6,10 +6,10 @@ import pytest
 
 import mapfilter as mf
 from mapfilter.errors import InputError
-from mapfilter.tracks.readers import text
-from mapfilter.tracks.readers.csv_headers import likely_fields
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
+from mapfilter.tracks.readers.plain.headers import likely_fields
+from mapfilter.tracks.readers.texts import text
 
 START_S = 1_778_666_400.0
 TIME_S = np.arange(120.0)

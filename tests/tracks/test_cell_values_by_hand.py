@@ -6,15 +6,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mapfilter.tracks.readers.csv_identities import _networks
 from mapfilter.tracks.readers.formats import read_recording
-from mapfilter.tracks.readers.identities import (
+from mapfilter.tracks.readers.plain.identities import _networks
+from mapfilter.tracks.readers.recorded.identities import (
     add_radio,
     available,
     cell_names,
     parse_identities,
 )
-from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recorded.reading import Reading
 
 START_S = 1_777_629_600.0
 NAN = np.nan

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import ConfigError
-from mapfilter.tracks.readers.local_times import (
+from mapfilter.tracks.readers.clocks.local_times import (
     change_notes,
     is_beside_change,
     parse_zone,

@@ -6,7 +6,7 @@ import pytest
 
 import mapfilter as mf
 from mapfilter.errors import InputError
-from mapfilter.tracks.speed_shift import best_shift, shift_note
+from mapfilter.tracks.joining.speed_shift import best_shift, shift_note
 
 COUNT = 900
 TIME_S = 1_778_666_400.0 + np.arange(float(COUNT))

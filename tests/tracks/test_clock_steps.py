@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.tracks.clock_steps import clock_steps, with_clocks_gone_on
+from mapfilter.tracks.checks.clock_steps import clock_steps, with_clocks_gone_on
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.store import read_log
 

@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mapfilter.tracks.clock_steps import clock_steps
-from mapfilter.tracks.readers.csv_odometry import _at_speeds
-from mapfilter.tracks.readers.csv_times import _without_digits
+from mapfilter.tracks.checks.clock_steps import clock_steps
 from mapfilter.tracks.readers.formats import read_recording
-from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.plain.odometry import _at_speeds
+from mapfilter.tracks.readers.plain.times import _without_digits
+from mapfilter.tracks.readers.recorded.reading import Reading
 
 START_S = 1_777_629_600.0
 NAN = np.nan

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mapfilter.tracks.combine import combine
-from mapfilter.tracks.headings import compass_fault
+from mapfilter.tracks.checks.headings import compass_fault
+from mapfilter.tracks.joining.combine import combine
 from mapfilter.tracks.open_options import CombineOptions
 from mapfilter.tracks.pdr.options import WalkOptions
 from mapfilter.tracks.readers.formats import read_recording

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapfilter.errors import ConfigError
-from mapfilter.tracks.combine import combine
+from mapfilter.tracks.joining.combine import combine
 from mapfilter.tracks.open_options import CombineOptions
 from mapfilter.tracks.pdr.counted import reckon_counted
 from mapfilter.tracks.pdr.options import WalkOptions

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapfilter.tracks.combine import combine
+from mapfilter.tracks.joining.combine import combine
 from mapfilter.tracks.open_options import CombineOptions
 from mapfilter.tracks.pdr.counted import reckon_counted
 from mapfilter.tracks.pdr.mounted import turning_of_mounted

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 import mapfilter as mf
-from mapfilter.tracks.readers import text
+from mapfilter.tracks.readers.texts import text
 
 COUNT = 40
 

@@ -3,7 +3,7 @@
 import pytest
 
 import mapfilter as mf
-from mapfilter.tracks.readers import text
+from mapfilter.tracks.readers.texts import text
 
 NOTE = "taken for the technology of cells, by its words"
 

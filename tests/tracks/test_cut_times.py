@@ -6,7 +6,7 @@ import pytest
 
 import mapfilter as mf
 from mapfilter.geodesy import unproject
-from mapfilter.tracks.cut_times import cut_times
+from mapfilter.tracks.checks.cut_times import cut_times
 from mapfilter.tracks.readers.formats import read_recording
 
 START_UTC_S = 1_777_629_600

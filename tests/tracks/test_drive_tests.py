@@ -7,10 +7,10 @@ from made_drive_tests import COUNT
 from made_recordings import LEVEL_DBM, MADE, START_UTC_S
 
 from mapfilter.errors import InputError
-from mapfilter.tracks.readers import events
-from mapfilter.tracks.readers import lines as line_reader
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
+from mapfilter.tracks.readers.texts import events
+from mapfilter.tracks.readers.texts import lines as line_reader
 
 START = '#START,23:59:58.000,,"1.5.2026"\n'
 LTE = "CELLMEAS,{at},,7,0,1,9,0,70001,1300,435,-60.6,-89.1,-10.1,302060,118.0\n"

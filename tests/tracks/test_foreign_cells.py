@@ -6,8 +6,8 @@ import pandas as pd
 import pytest
 
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.tracks import foreign_cells as module
-from mapfilter.tracks.foreign_cells import foreign_cells, unknown_neighbours_note
+from mapfilter.tracks.checks import foreign_cells as module
+from mapfilter.tracks.checks.foreign_cells import foreign_cells, unknown_neighbours_note
 
 IDENTITIES = ((3021, 11701), (3021, 11702), (3022, 11801))
 

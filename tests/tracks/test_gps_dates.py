@@ -9,9 +9,9 @@ import pytest
 import mapfilter as mf
 from mapfilter.errors import InputError
 from mapfilter.tracks.open_log import open_log
+from mapfilter.tracks.readers.clocks.times import utc_from_week_s
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
-from mapfilter.tracks.readers.times import utc_from_week_s
 
 COUNT = 600
 UTC_S = datetime(2026, 5, 1, 10, tzinfo=UTC).timestamp()
@@ -153,7 +153,7 @@ def test_weeks_of_a_year_are_none_of_gps(tmp_path):
 
 def test_weeks_begin_anew_between_parts_of_a_file(tmp_path, monkeypatch):
     """A large file is read by parts, of which the later ones go on."""
-    monkeypatch.setattr("mapfilter.tracks.readers.text._PART_BYTES", 1 << 12)
+    monkeypatch.setattr("mapfilter.tracks.readers.texts.text._PART_BYTES", 1 << 12)
     tow_s = (WEEK_S - 100 + ELAPSED_S) % WEEK_S
     path = written(tmp_path / "fixes.csv", tow_s, **WAY)
     rows = read_recording(path, options=ReadOptions()).tables["positions"]
@@ -172,7 +172,7 @@ def weeks_and_seconds(week, begin_tow_s, count, stays):
 @pytest.mark.parametrize("stays", [0, 1, 37, None])
 @pytest.mark.parametrize("part_bytes", [1 << 24, 1000])
 def test_a_week_that_stays_when_its_seconds_begin_anew(tmp_path, monkeypatch, stays, part_bytes):
-    monkeypatch.setattr("mapfilter.tracks.readers.text._PART_BYTES", part_bytes)
+    monkeypatch.setattr("mapfilter.tracks.readers.texts.text._PART_BYTES", part_bytes)
     lines = 300
     weeks, tow_s = weeks_and_seconds(2416, WEEK_S - 102, lines, stays)
     rows = {"week": weeks, "tow": tow_s, "latitude": 60 + 1e-6 * np.arange(lines)}

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mapfilter.tracks.headings import heading_fault
+from mapfilter.tracks.checks.headings import heading_fault
 
 
 def fault_of(course, heading):

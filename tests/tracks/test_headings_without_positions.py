@@ -10,10 +10,10 @@ import mapfilter as mf
 from mapfilter.geodesy import project
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.tracks.checks.placeless import in_frame
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.open_log import open_log
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions
-from mapfilter.tracks.placeless import in_frame
 from mapfilter.workflows.convert import run_convert
 
 CRS, LAT, LON = "EPSG:32635", 60.17, 24.94

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.tracks.identify import name_by_plan
+from mapfilter.tracks.joining.identify import name_by_plan
 from mapfilter.tracks.log import make_log
 
 CRS = "EPSG:32635"

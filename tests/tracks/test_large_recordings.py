@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mapfilter.tracks.readers import text
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
+from mapfilter.tracks.readers.texts import text
 
 ROWS = 400
 ORDER = np.arange(ROWS)

@@ -6,7 +6,7 @@ import pytest
 import mapfilter as mf
 from mapfilter.survey.antennas_log import _iso
 from mapfilter.survey.measurement_rows import unix_seconds
-from mapfilter.tracks.readers.times import parse_times
+from mapfilter.tracks.readers.clocks.times import parse_times
 
 NEW_YEAR_S = 1_483_228_800.0
 ISO = [

@@ -8,8 +8,8 @@ import pytest
 
 import mapfilter as mf
 from mapfilter.errors import InputError
-from mapfilter.tracks.readers.csv_headers import likely_fields
 from mapfilter.tracks.readers.formats import read_recording
+from mapfilter.tracks.readers.plain.headers import likely_fields
 
 TIME_S = 1.7e9 + np.arange(40.0)
 PLACES = {"latitude": 60.17, "longitude": 24.94 + 1e-5 * np.arange(40)}

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mapfilter.tracks.readers.lines import _padded
+from mapfilter.tracks.readers.texts.lines import _padded
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,9 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import Faults
-from mapfilter.tracks.clock_notes import week_fault
+from mapfilter.tracks.checks.clock_notes import week_fault
+from mapfilter.tracks.checks.log_checks import check_clocks, check_steps, ends_early, odd_start
 from mapfilter.tracks.column_values import TableFaults, column_values
-from mapfilter.tracks.log_checks import check_clocks, check_steps, ends_early, odd_start
 from mapfilter.tracks.schema import SCHEMA
 
 TURN_RAD = 6.283185307

@@ -6,7 +6,7 @@ import pytest
 from mapfilter.errors import Faults
 from mapfilter.geodesy import project
 from mapfilter.lattice import Lattice
-from mapfilter.tracks.misplaced import check_near, degrees_for_metres, misplaced_by
+from mapfilter.tracks.checks.misplaced import check_near, degrees_for_metres, misplaced_by
 
 CRS = "EPSG:32631"
 

@@ -13,10 +13,10 @@ import mapfilter as mf
 from mapfilter.geodesy import unproject
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.log_options import fitted_to_log
+from mapfilter.tracks.checks.motion_fault import fault_notes
+from mapfilter.tracks.checks.motion_faults import motion_faults, step_fault
+from mapfilter.tracks.checks.turn_faults import turn_fault
 from mapfilter.tracks.motion_factors import scaled_motion
-from mapfilter.tracks.motion_fault import fault_notes
-from mapfilter.tracks.motion_faults import motion_faults, step_fault
-from mapfilter.tracks.turn_faults import turn_fault
 
 FOOT_M = 0.3048
 

@@ -10,11 +10,11 @@ import pytest
 
 import mapfilter as mf
 from mapfilter.errors import InputError
-from mapfilter.tracks.headings import are_mirrored
-from mapfilter.tracks.mirrored import mirrored_by
-from mapfilter.tracks.motion_faults import motion_faults
-from mapfilter.tracks.stretches import stretches
-from mapfilter.tracks.turn_drift import turn_drift_radps
+from mapfilter.tracks.checks.headings import are_mirrored
+from mapfilter.tracks.checks.mirrored import mirrored_by
+from mapfilter.tracks.checks.motion_faults import motion_faults
+from mapfilter.tracks.checks.stretches import stretches
+from mapfilter.tracks.checks.turn_drift import turn_drift_radps
 
 COUNT = 900
 

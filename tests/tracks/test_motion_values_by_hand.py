@@ -4,11 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mapfilter.tracks.position_units import continuous_deg, metres_about_middle, near_deg
+from mapfilter.tracks.checks.rounded_degrees import rounding_m, with_rounding
+from mapfilter.tracks.checks.speeds import speed_fault, walkers_unit_m
+from mapfilter.tracks.joining.position_units import continuous_deg, metres_about_middle, near_deg
 from mapfilter.tracks.readers.formats import read_recording
-from mapfilter.tracks.readers.odometer_counts import counted_way
-from mapfilter.tracks.rounded_degrees import rounding_m, with_rounding
-from mapfilter.tracks.speeds import speed_fault, walkers_unit_m
+from mapfilter.tracks.readers.recorded.odometer_counts import counted_way
 
 START_S = 1_777_629_600.0
 NAN = np.nan

@@ -7,8 +7,8 @@ import pytest
 import mapfilter as mf
 from mapfilter.errors import InputError
 from mapfilter.geodesy import unproject
+from mapfilter.tracks.joining.recordings import read_recordings
 from mapfilter.tracks.open_options import OpenOptions
-from mapfilter.tracks.recordings import read_recordings
 
 TIME_S = 1_777_629_600 + np.arange(60)
 

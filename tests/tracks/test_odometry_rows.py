@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mapfilter.tracks.moved import motion_from_odometry, odometry_gaps
+from mapfilter.tracks.joining.moved import motion_from_odometry, odometry_gaps
 from mapfilter.tracks.open_log import open_log
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.pdr.vehicle import reckon_odometry

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import InputError
+from mapfilter.tracks.joining.sampling import sampling_sd_m
 from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.readers.smartloc import _deviation, _geodetic, _satellites
-from mapfilter.tracks.sampling import sampling_sd_m
 
 START_S = 1_777_629_600
 NAN = np.nan

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mapfilter as mf
+from mapfilter.tracks.joining.no_fix import holds_no_fix, rows_without_fix
 from mapfilter.tracks.log import make_log
-from mapfilter.tracks.no_fix import holds_no_fix, rows_without_fix
 from mapfilter.tracks.store import read_log
 
 CRS = "EPSG:32633"

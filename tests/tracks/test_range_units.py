@@ -6,8 +6,8 @@ import pytest
 
 from mapfilter.errors import InputError
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.tracks.checks.range_units import range_notes, with_range_notes
 from mapfilter.tracks.log import make_log
-from mapfilter.tracks.range_units import range_notes, with_range_notes
 
 CRS = "EPSG:32635"
 EAST_M, NORTH_M = 385_000.0, 6_672_000.0

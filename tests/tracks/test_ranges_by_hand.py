@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.tables import RECORDED
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Clock
+from mapfilter.tracks.readers.recorded.tables import RECORDED
 
 START_S = 1_777_629_600.0
 USUAL = {

@@ -5,9 +5,9 @@ import pandas as pd
 import pytest
 
 from mapfilter.angles import wrap_rad
-from mapfilter.tracks.moved import course_errors, motion_from_course
+from mapfilter.tracks.joining.moved import course_errors, motion_from_course
+from mapfilter.tracks.joining.position_motion import motion_from_positions
 from mapfilter.tracks.pdr.vehicle import reckon_velocity
-from mapfilter.tracks.position_motion import motion_from_positions
 
 
 def drive(sd_m, seed=0, count=2000, speed_mps=8.0):

@@ -6,9 +6,9 @@ import pytest
 
 import mapfilter as mf
 from mapfilter.errors import InputError
-from mapfilter.tracks.readers import text
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
+from mapfilter.tracks.readers.texts import text
 
 COUNT = 300
 START = pd.Timestamp("2026-05-13 10:00:00")

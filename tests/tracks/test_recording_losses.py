@@ -9,8 +9,8 @@ import mapfilter as mf
 from mapfilter.angles import azimuth_from_heading_deg
 from mapfilter.errors import InputError
 from mapfilter.geodesy import unproject
-from mapfilter.tracks.readers import text
 from mapfilter.tracks.readers.formats import read_recording
+from mapfilter.tracks.readers.texts import text
 
 START_UTC_S = 1_777_629_600
 COUNT = 200

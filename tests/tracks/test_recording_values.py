@@ -9,11 +9,11 @@ from made_recordings import COUNT, LEVEL_DBM, MADE, gnettrack
 from made_satellites import nmea, sentence
 
 from mapfilter.errors import InputError
-from mapfilter.tracks.combine import combine
+from mapfilter.tracks.joining.combine import combine
+from mapfilter.tracks.readers.clocks.times import parse_times
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
-from mapfilter.tracks.readers.recorded_values import duplicates
-from mapfilter.tracks.readers.times import parse_times
+from mapfilter.tracks.readers.recorded.recorded_values import duplicates
 
 
 def test_cells_of_lte_keep_their_carriers_codes_and_identities(written):

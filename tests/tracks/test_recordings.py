@@ -16,7 +16,7 @@ from made_recordings import (
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import FORMATS, read_recording
-from mapfilter.tracks.readers.text import read_text
+from mapfilter.tracks.readers.texts.text import read_text
 
 ROWS = {
     "gnettrack": {"positions": COUNT, "radio": 2 * COUNT},

@@ -9,11 +9,11 @@ from made_recordings import COUNT, MADE
 
 from mapfilter.errors import InputError, MapfilterError
 from mapfilter.tracks.readers import gnsslogger
-from mapfilter.tracks.readers import lines as lines_reader
-from mapfilter.tracks.readers import text as texts
 from mapfilter.tracks.readers.formats import read_recording
-from mapfilter.tracks.readers.recording import Recording
-from mapfilter.tracks.readers.tables import RECORDED
+from mapfilter.tracks.readers.recorded.recording import Recording
+from mapfilter.tracks.readers.recorded.tables import RECORDED
+from mapfilter.tracks.readers.texts import lines as lines_reader
+from mapfilter.tracks.readers.texts import text as texts
 
 
 def check(recording: Recording) -> None:

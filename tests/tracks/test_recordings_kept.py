@@ -118,7 +118,7 @@ def test_where_a_file_is_cut_into_parts_does_not_matter(drive, monkeypatch):
     levels = np.where(ROW < 20, [f"{level} dBm" for level in RECEIVED], RECEIVED)
     levels[32:] = "NaN"
     for part_bytes in (1 << 24, 700):
-        monkeypatch.setattr("mapfilter.tracks.readers.text._PART_BYTES", part_bytes)
+        monkeypatch.setattr("mapfilter.tracks.readers.texts.text._PART_BYTES", part_bytes)
         with pytest.raises(InputError, match="found 20 of 32 values"):
             drive(level_dbm=levels)
 
@@ -127,7 +127,7 @@ def test_unwrapped_headings_are_wrapped(drive, monkeypatch):
     heading = np.linspace(0.0, 19.8, 60)
     told = "motion, heading_rad: 41 values beyond a turn, wrapped (unwrapped)"
     for part_bytes in (1 << 24, 700):
-        monkeypatch.setattr("mapfilter.tracks.readers.text._PART_BYTES", part_bytes)
+        monkeypatch.setattr("mapfilter.tracks.readers.texts.text._PART_BYTES", part_bytes)
         found = drive(heading_rad=heading)
         kept = found.tables["motion"]["heading_rad"].to_numpy()
         assert np.cos(kept - heading) == pytest.approx(1.0)
@@ -150,7 +150,7 @@ def test_unwrapped_headings_are_wrapped(drive, monkeypatch):
 def test_unwrapped_azimuths_are_wrapped(begin, part_bytes, drive, monkeypatch):
     """Such columns were refused."""
     azimuth = begin + np.linspace(0.0, 500.3, 60)
-    monkeypatch.setattr("mapfilter.tracks.readers.text._PART_BYTES", part_bytes)
+    monkeypatch.setattr("mapfilter.tracks.readers.texts.text._PART_BYTES", part_bytes)
     found = drive(compass_deg=azimuth)
     kept = found.tables["motion"]["compass_deg"].to_numpy()
     np.testing.assert_allclose(np.exp(1j * np.radians(kept - azimuth)), 1.0)
@@ -235,7 +235,7 @@ def test_a_copy_that_was_cut_off_loses_its_last_row_only(copied, end, count, wha
 
 @pytest.mark.parametrize("cut", [b"\n", b""])
 def test_of_a_large_table_read_in_parts_the_end_is_cut(copied, cut, monkeypatch):
-    monkeypatch.setattr("mapfilter.tracks.readers.text._PART_BYTES", 600)
+    monkeypatch.setattr("mapfilter.tracks.readers.texts.text._PART_BYTES", 600)
     found, notes = copied(b"1777629630,24.9300030,60" + cut)
     assert found == 30 + bool(cut)
     assert [note.endswith("without a line end) (line 32)") for note in notes] == [True] * (not cut)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from made_recordings import MADE
 
-from mapfilter.tracks.readers import lines as line_reader
 from mapfilter.tracks.readers.formats import read_recording
+from mapfilter.tracks.readers.texts import lines as line_reader
 
 TYPES = ["L1", "L2", "C1", "P2", "D1", "S1", "S2"]
 PER_LINE = 5

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mapfilter.tracks.rounded_degrees import rounded_notes, rounding_m, with_rounding
+from mapfilter.tracks.checks.rounded_degrees import rounded_notes, rounding_m, with_rounding
 
 STEP_M = 111.195
 """A thousandth of a degree of latitude."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mapfilter.tracks.sampling import sampling_sd_m
+from mapfilter.tracks.joining.sampling import sampling_sd_m
 
 
 def deviations(time_s, *velocities):

@@ -5,10 +5,10 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import InputError
+from mapfilter.tracks.checks.refused_motion import refused_faults
+from mapfilter.tracks.checks.second_deliveries import once_each
+from mapfilter.tracks.checks.speeds import speed_fault
 from mapfilter.tracks.log import make_log
-from mapfilter.tracks.refused_motion import refused_faults
-from mapfilter.tracks.second_deliveries import once_each
-from mapfilter.tracks.speeds import speed_fault
 
 CRS = "EPSG:32635"
 COUNT = 900

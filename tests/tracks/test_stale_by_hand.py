@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mapfilter.tracks.readers.stale import repeated_readings
+from mapfilter.tracks.readers.recorded.stale import repeated_readings
 
 METRE_DEG = 90 / 1e7
 """A metre north: a quarter of a meridian has ten million."""

@@ -9,11 +9,12 @@ import pytest
 
 import mapfilter as mf
 from mapfilter.errors import InputError
-from mapfilter.tracks.readers import gpx, lines, text
+from mapfilter.tracks.readers import gpx
+from mapfilter.tracks.readers.clocks.local_times import utc_from_local_s
+from mapfilter.tracks.readers.clocks.times import parse_times
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
-from mapfilter.tracks.readers.local_times import utc_from_local_s
-from mapfilter.tracks.readers.times import parse_times
+from mapfilter.tracks.readers.texts import lines, text
 
 BERLIN = "Europe/Berlin"
 BACK_S = datetime(2026, 10, 25, 1, tzinfo=ZoneInfo("UTC")).timestamp()

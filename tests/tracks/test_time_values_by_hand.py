@@ -8,16 +8,14 @@ import pyarrow as pa
 import pytest
 
 from mapfilter.errors import ConfigError
-from mapfilter.tracks.readers.formats import read_recording
-from mapfilter.tracks.readers.local_times import (
+from mapfilter.tracks.readers.clocks.local_times import (
     change_notes,
     is_beside_change,
     parse_zone,
     utc_from_local_s,
 )
-from mapfilter.tracks.readers.nmea_stamps import _stamp_s, stamped_dates
-from mapfilter.tracks.readers.plain_times import plain_times
-from mapfilter.tracks.readers.times import (
+from mapfilter.tracks.readers.clocks.plain_times import plain_times
+from mapfilter.tracks.readers.clocks.times import (
     are_days,
     in_days,
     parse_times,
@@ -27,6 +25,8 @@ from mapfilter.tracks.readers.times import (
     utc_from_week_s,
     without_midnights,
 )
+from mapfilter.tracks.readers.formats import read_recording
+from mapfilter.tracks.readers.nmea_stamps import _stamp_s, stamped_dates
 
 DAY_S = 86_400.0
 NAN = np.nan

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import projected_crs
+from mapfilter.tracks.checks.placeless import is_local_frame
 from mapfilter.tracks.log import make_log
-from mapfilter.tracks.placeless import is_local_frame
 
 CRS = "EPSG:32629"
 

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mapfilter.tracks.turn_drift import turn_drift_radps
+from mapfilter.tracks.checks.turn_drift import turn_drift_radps
 
 
 def journey(rng, drift_degps=0.0, white_degps=0.1, fix_sd_m=4.0, speed_mps=10.0):

@@ -6,9 +6,9 @@ import pytest
 
 from mapfilter.positioning.kalman.filter import KalmanFilter
 from mapfilter.positioning.log_options import fitted_to_log
+from mapfilter.tracks.checks.turn_noise import turns_at_standstill
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.log import make_log
-from mapfilter.tracks.turn_noise import turns_at_standstill
 
 USUAL_DEG = 0.15
 """Random walk of a usual gyroscope, per root second."""

@@ -8,7 +8,7 @@ import pyarrow as pa
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.tracks.exchanged import (
+from mapfilter.tracks.checks.exchanged import (
     _exchanged,
     _fast_mps,
     _is_heading,
@@ -16,18 +16,22 @@ from mapfilter.tracks.exchanged import (
     _unsigned,
     sideways_mps2,
 )
-from mapfilter.tracks.gps_dates import _mistakes, _named_s, week_start_s
-from mapfilter.tracks.raw_satellites import _between_clocks_m, _sane_places, log_pseudoranges
-from mapfilter.tracks.readers.columns import Columns
-from mapfilter.tracks.readers.csv_mapped import Mapped
-from mapfilter.tracks.readers.csv_places import _within_turn
-from mapfilter.tracks.readers.csv_speed_units import speed_unit
+from mapfilter.tracks.checks.stated_errors import stated_note
+from mapfilter.tracks.joining.gps_dates import _mistakes, _named_s, week_start_s
+from mapfilter.tracks.joining.raw_satellites import (
+    _between_clocks_m,
+    _sane_places,
+    log_pseudoranges,
+)
+from mapfilter.tracks.joining.speed_shift import shift_note
 from mapfilter.tracks.readers.formats import read_recording
-from mapfilter.tracks.readers.held_positions import own_positions
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Clock, Recording
-from mapfilter.tracks.speed_shift import shift_note
-from mapfilter.tracks.stated_errors import stated_note
+from mapfilter.tracks.readers.plain.mapped import Mapped
+from mapfilter.tracks.readers.plain.places import _within_turn
+from mapfilter.tracks.readers.plain.speed_units import speed_unit
+from mapfilter.tracks.readers.recorded.held_positions import own_positions
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Clock, Recording
+from mapfilter.tracks.readers.texts.columns import Columns
 
 START_S = 1_777_629_600.0
 NAN = np.nan

@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.tracks import drive
-from mapfilter.tracks.drive import drive_of, own_turning
+from mapfilter.tracks.joining import drive
+from mapfilter.tracks.joining.drive import drive_of, own_turning
 from mapfilter.tracks.pdr.turns import turning_of
-from mapfilter.tracks.readers.recording import Clock, Recording
+from mapfilter.tracks.readers.recorded.recording import Clock, Recording
 
 UTC = Clock("utc")
 START_S = 1_777_630_000.0

@@ -6,16 +6,16 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from mapfilter.tracks.readers.columns import Columns
-from mapfilter.tracks.readers.csv_mapped import Mapped
-from mapfilter.tracks.readers.csv_weeks import (
+from mapfilter.tracks.readers.plain.mapped import Mapped
+from mapfilter.tracks.readers.plain.weeks import (
     over_days,
     over_stuck_weeks,
     over_weeks,
     week_column,
     weeks_of,
 )
-from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.texts.columns import Columns
 
 WEEK_S, DAY_S = 604_800.0, 86_400.0
 NAN = np.nan

@@ -5,7 +5,7 @@ from math import isnan, nan, pi
 import numpy as np
 import pytest
 
-from mapfilter.tracks.readers.wound import TURN_DEG, TURN_RAD, Winding
+from mapfilter.tracks.readers.recorded.wound import TURN_DEG, TURN_RAD, Winding
 
 
 def unwound(winding, *headings, outside=None):

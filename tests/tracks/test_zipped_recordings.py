@@ -7,11 +7,11 @@ import pytest
 from made_recordings import MADE, START_UTC_S
 
 from mapfilter.errors import InputError
+from mapfilter.tracks.joining.recordings import read_recordings
 from mapfilter.tracks.open_log import open_log
 from mapfilter.tracks.open_options import OpenOptions
-from mapfilter.tracks.readers import zipped
 from mapfilter.tracks.readers.formats import read_recording
-from mapfilter.tracks.recordings import read_recordings
+from mapfilter.tracks.readers.texts import zipped
 from mapfilter.workflows.convert import report_lines, run_convert
 from mapfilter.workflows.info import run_info
 

@@ -7,7 +7,7 @@ from mapfilter._area_scale import check_scale
 from mapfilter.config.load import load_config
 from mapfilter.errors import InputError
 from mapfilter.geodesy import check_bbox, project
-from mapfilter.workflows.area_lattice import area_lattice
+from mapfilter.workflows.inputs.area_lattice import area_lattice
 
 ACROSS = "area.bbox: expected an area on one side of 180° of longitude, found "
 SIDES = "make an area of each side: 179.9,-17,180,-16.9 and -180,-17,-179.9,-16.9"

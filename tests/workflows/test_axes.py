@@ -9,9 +9,9 @@ from mapfilter.config.sections import Config, FilterSection
 from mapfilter.errors import ConfigError
 from mapfilter.positioning import BUILT_IN
 from mapfilter.positioning.locators import filter_options
-from mapfilter.workflows.filter_choice import filter_choice, option_sections
+from mapfilter.workflows.inputs.filter_choice import filter_choice, option_sections
 from mapfilter.workflows.simulate import simulation_settings
-from mapfilter.workflows.sweep_plan import _readings, _varied
+from mapfilter.workflows.sweeps.plan import _readings, _varied
 
 
 def test_numeric_options_of_four_sections_are_axes():

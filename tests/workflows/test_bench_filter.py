@@ -3,8 +3,9 @@
 import pytest
 
 from mapfilter.errors import ConfigError
-from mapfilter.workflows import bench_filter, bench_threads
 from mapfilter.workflows.bench import run_bench
+from mapfilter.workflows.benchmarks import filter as bench_filter
+from mapfilter.workflows.benchmarks import threads as bench_threads
 
 SMALL = (
     "area.bbox=24.9420,60.1660,24.9495,60.1697", "area.resolution_m=10", "journeys.length_m=400",

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import ConfigError
-from mapfilter.workflows import bench_memory
 from mapfilter.workflows.bench import STAGES, made_rasters, run_bench
+from mapfilter.workflows.benchmarks import memory as bench_memory
 
 
 def test_a_task_is_measured_in_a_process_of_its_own(tmp_path):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mapfilter.workflows import bench_sweep
+from mapfilter.workflows.benchmarks import sweep as bench_sweep
 
 
 @pytest.mark.filterwarnings("default")

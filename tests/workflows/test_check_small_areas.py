@@ -15,7 +15,7 @@ from mapfilter.lattice import Lattice
 from mapfilter.propagation.models import PredictionModel
 from mapfilter.propagation.predict import predict
 from mapfilter.radio.cells import Cell, CellPlan
-from mapfilter.workflows.check_places import check_sites
+from mapfilter.workflows.checks.places import check_sites
 
 MODEL = PredictionModel(model="log_distance")
 WEST_M, SOUTH_M, EAST_M, NORTH_M = LATTICE.bounds_m

@@ -10,7 +10,7 @@ from mapfilter.geodesy import project, utm_crs
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff_writer import write_rasters
-from mapfilter.workflows.check_places import check_sites
+from mapfilter.workflows.checks.places import check_sites
 
 BERGEN = 5.32, 60.39
 

@@ -33,8 +33,8 @@ from mapfilter.positioning.loop import locate
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.tracks.store import read_log, write_log
 from mapfilter.viewing.words import REASONS
-from mapfilter.workflows import replay_log
 from mapfilter.workflows.replay import run_replay
+from mapfilter.workflows.replays import located_log as replay_log
 
 
 def test_some_cells_unknown(log, replay, tmp_path):
@@ -359,7 +359,7 @@ def test_a_logs_randomness_depends_on_its_name_not_on_its_neighbours(world, tmp_
         drawn.setdefault(log.truth_length_m, []).append(rng.integers(2**62))
         return locate(log, filter_, rng, **options)
 
-    monkeypatch.setattr("mapfilter.workflows.replay_log.locate", drawing)
+    monkeypatch.setattr("mapfilter.workflows.replays.located_log.locate", drawing)
     settings = ["output.pictures=none", f"database.path={world.database}"]
     for path in (world.journeys, world.journeys / "journey-0001-draw-000"):
         config = load_config(world.toml, [*settings, f"track.path={path}"])
@@ -383,8 +383,8 @@ def test_logs_share_a_filter_where_their_options_are_equal(same, world, tmp_path
         filters.append(filter_)
         return locate(log, filter_, rng, **options)
 
-    monkeypatch.setattr("mapfilter.workflows.replay_log.fitted_to_log", fitted)
-    monkeypatch.setattr("mapfilter.workflows.replay_log.locate", drawing)
+    monkeypatch.setattr("mapfilter.workflows.replays.located_log.fitted_to_log", fitted)
+    monkeypatch.setattr("mapfilter.workflows.replays.located_log.locate", drawing)
     settings = ["output.pictures=none", f"database.path={world.database}"]
     config = load_config(world.toml, [*settings, f"track.path={world.journeys}"])
     run_replay(config, tmp_path / "out")

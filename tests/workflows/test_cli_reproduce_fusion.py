@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from mapfilter.cli import app
 from mapfilter.experiments.papers.fritsche_klein_2009 import paper
-from mapfilter.workflows import bench_fusion
+from mapfilter.workflows.benchmarks import fusion as bench_fusion
 
 QUANTITIES = {"location_m", "velocity_mps", "bias_m", "drift_mps"}
 

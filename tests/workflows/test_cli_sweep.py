@@ -19,8 +19,8 @@ from mapfilter.experiments.sweep.run import sweep
 from mapfilter.experiments.sweep.table import read_runs
 from mapfilter.workflows.simulate import run_simulate
 from mapfilter.workflows.sweep import load_sweep, run_sweep
-from mapfilter.workflows.sweep_plan import sweep_plans, sweep_world
-from mapfilter.workflows.sweep_tables import brief_pairs
+from mapfilter.workflows.sweeps.plan import sweep_plans, sweep_world
+from mapfilter.workflows.sweeps.tables import brief_pairs
 
 GRID = settings(
     sweep__sigma_orient_deg="0,6",

@@ -13,7 +13,7 @@ from mapfilter.config.load import load_config
 from mapfilter.geodesy import project
 from mapfilter.lattice import Lattice
 from mapfilter.tracks.sensors import read_sensors
-from mapfilter.workflows.logs import open_journey
+from mapfilter.workflows.inputs.logs import open_journey
 
 START_UTC_S = 1_777_629_600
 NAMES = {

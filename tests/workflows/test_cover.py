@@ -73,7 +73,7 @@ def test_a_part_of_the_map_and_of_the_rasters(own_world):
 def test_a_header_that_tells_too_little_is_no_reason_for_a_note(own_world, monkeypatch):
     """The ways reach all over the box that the header says to be covered by a third."""
     third = (24.9420, 60.1660, 24.9445, 60.1697)
-    monkeypatch.setattr("mapfilter.workflows.world.map_bounds_deg", lambda _: third)
+    monkeypatch.setattr("mapfilter.workflows.inputs.world.map_bounds_deg", lambda _: third)
     given = ("-c", own_world.toml, f"--set=output.dir={own_world.folder / 'again'}")
     found = assert_done(mapfilter("predict", *given, "--json")).json
     assert not any("covers" in note for note in found["notes"])

@@ -16,7 +16,7 @@ from mapfilter.simulation.layout import lay_out_plan
 from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.simulate import SimulationSettings
 from mapfilter.workflows import simulate
-from mapfilter.workflows.filter_choice import filter_choice
+from mapfilter.workflows.inputs.filter_choice import filter_choice
 
 CONFIG = Config()
 

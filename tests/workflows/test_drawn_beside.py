@@ -19,8 +19,8 @@ from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.positioned_track import Snapshot
 from mapfilter.report.ground import BaseMap
-from mapfilter.workflows import track_pictures
-from mapfilter.workflows.track_pictures import (
+from mapfilter.workflows.outputs import track_pictures
+from mapfilter.workflows.outputs.track_pictures import (
     TrackPictures,
     begin_belief,
     begin_pictures,
@@ -114,11 +114,11 @@ def test_what_locates_imports_neither_what_draws_nor_what_reads_maps_and_rasters
 
 def test_a_replay_of_a_track_log_imports_no_readers_of_recordings_and_no_page():
     """They are a sixth of the modules of its own; asked of a process of its own."""
-    others = {"mapfilter.tracks.combine", "mapfilter.tracks.readers.formats"}
+    others = {"mapfilter.tracks.joining.combine", "mapfilter.tracks.readers.formats"}
     others |= {"mapfilter.viewing.bundle", "mapfilter.survey.measured_map"}
     code = (
         "import sys, mapfilter.config.load, mapfilter.workflows.replay, "
-        "mapfilter.workflows.replay_text\n"
+        "mapfilter.workflows.replays.text\n"
         f"print(*{others!r} & set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)

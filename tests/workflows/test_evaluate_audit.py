@@ -13,11 +13,11 @@ from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.workflows.evaluate import _world as prepare_world
-from mapfilter.workflows.evaluate_audit import CHANGES
-from mapfilter.workflows.evaluate_settings import load_benchmark
-from mapfilter.workflows.filter_choice import filter_choice
+from mapfilter.workflows.evaluations.audit import CHANGES
+from mapfilter.workflows.evaluations.settings import load_benchmark
+from mapfilter.workflows.inputs.filter_choice import filter_choice
+from mapfilter.workflows.inputs.world import World
 from mapfilter.workflows.simulate import simulation_settings
-from mapfilter.workflows.world import World
 
 EASY = (
     PredictionModel(shadowing_db=6.0),

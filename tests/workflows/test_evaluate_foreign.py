@@ -15,15 +15,15 @@ from mapfilter.experiments.benchmarks.results import summarise
 from mapfilter.experiments.benchmarks.world_cases import CASES_OF, FOREIGN, HARSH, SENSORS
 from mapfilter.tracks.store import read_log
 from mapfilter.workflows.evaluate import main_table
-from mapfilter.workflows.evaluate_foreign import (
+from mapfilter.workflows.evaluations.foreign import (
     load_foreign,
     missing_ways_file,
     prepare,
     run_foreign,
     write_journeys,
 )
-from mapfilter.workflows.filter_choice import filter_choice
-from mapfilter.workflows.world import World
+from mapfilter.workflows.inputs.filter_choice import filter_choice
+from mapfilter.workflows.inputs.world import World
 
 SMALL = [
     'area.map="manhattan"',

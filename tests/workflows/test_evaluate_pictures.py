@@ -7,11 +7,11 @@ from command_line import assert_refused, mapfilter
 
 from mapfilter.evaluation.stanford import REGIONS
 from mapfilter.experiments.sweep.world import open_world
-from mapfilter.workflows import evaluate_foreign
 from mapfilter.workflows.evaluate import run_global_positioning
-from mapfilter.workflows.evaluate_foreign import load_foreign, run_foreign
-from mapfilter.workflows.evaluate_runs import street_base
-from mapfilter.workflows.evaluate_settings import load_benchmark
+from mapfilter.workflows.evaluations import foreign as evaluate_foreign
+from mapfilter.workflows.evaluations.foreign import load_foreign, run_foreign
+from mapfilter.workflows.evaluations.runs import street_base
+from mapfilter.workflows.evaluations.settings import load_benchmark
 
 SMALL = [
     'area.map="manhattan"',

@@ -16,8 +16,8 @@ from mapfilter.experiments.recorded.rows import Found
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.step_output import Fix
-from mapfilter.workflows import evaluate_recorded
-from mapfilter.workflows.evaluate_recorded import run_all, run_recorded
+from mapfilter.workflows.evaluations import recorded as evaluate_recorded
+from mapfilter.workflows.evaluations.recorded import run_all, run_recorded
 
 
 def _estimate(off_m):

@@ -29,13 +29,13 @@ from mapfilter.errors import ConfigError
 from mapfilter.experiments.benchmarks.cases import CASES
 from mapfilter.experiments.benchmarks.global_positioning import informed
 from mapfilter.lattice import Lattice
-from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.area.area_map import AreaMap
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.workflows.evaluate import _world as prepare_world
-from mapfilter.workflows.evaluate_settings import _refused, load_benchmark
-from mapfilter.workflows.filter_choice import filter_choice
-from mapfilter.workflows.world import World
+from mapfilter.workflows.evaluations.settings import _refused, load_benchmark
+from mapfilter.workflows.inputs.filter_choice import filter_choice
+from mapfilter.workflows.inputs.world import World
 
 LATTICE = Lattice("EPSG:32629", 500_000.0, 4_500_000.0, 10.0, 2, 2)
 EMPTY = np.zeros((2, 2), dtype=np.float32)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from mapfilter.experiments.benchmarks.results import CaseResult
 from mapfilter.workflows.evaluate import EvaluateResult, main_table
-from mapfilter.workflows.result_text import text_lines
+from mapfilter.workflows.outputs.result_text import text_lines
 
 
 def case(name, **figures):

@@ -17,10 +17,10 @@ from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.walking import WalkerModel
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.workflows.evaluate import _world as prepare_world
-from mapfilter.workflows.evaluate_settings import WORLDS, load_benchmark
-from mapfilter.workflows.filter_choice import filter_choice
+from mapfilter.workflows.evaluations.settings import WORLDS, load_benchmark
+from mapfilter.workflows.inputs.filter_choice import filter_choice
+from mapfilter.workflows.inputs.world import World
 from mapfilter.workflows.simulate import simulation_settings
-from mapfilter.workflows.world import World
 
 SMALL = [
     'area.map="manhattan"',

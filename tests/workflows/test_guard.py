@@ -8,7 +8,7 @@ import time
 import pytest
 
 from mapfilter.errors import InputError, fail
-from mapfilter.workflows.guard import guarded
+from mapfilter.workflows.outputs.guard import guarded
 from mapfilter.workflows.pipeline import run_pipeline
 
 RAISED = [

@@ -8,9 +8,9 @@ import pytest
 from command_line import assert_refused, mapfilter
 
 from mapfilter.config.load import load_config
-from mapfilter.tracks.placeless import is_local_frame
+from mapfilter.tracks.checks.placeless import is_local_frame
 from mapfilter.workflows.convert import run_convert
-from mapfilter.workflows.replay_logs import ReplayLogs
+from mapfilter.workflows.replays.logs import ReplayLogs
 
 CRS, LAT, LON = "EPSG:32635", 60.17, 24.94
 # Of the meridian of zone 35, 27 degrees east: by the sine of the latitude.

@@ -8,7 +8,7 @@ import pytest
 
 from mapfilter.filters.contract import Status
 from mapfilter.tracks.log import make_log
-from mapfilter.workflows.replay_lacks import early_end_note
+from mapfilter.workflows.replays.lacks import early_end_note
 
 TIME_S = np.arange(20.0)
 MOTION = pd.DataFrame({"time_s": TIME_S, "step_m": 1.4, "heading_rad": 0.0})

@@ -5,7 +5,7 @@ from command_line import assert_done, assert_refused, mapfilter
 
 from mapfilter.config.load import load_config
 from mapfilter.database.store import open_database
-from mapfilter.workflows.world import World
+from mapfilter.workflows.inputs.world import World
 
 SMALL = ["area.size_m=600,600", "cells.sites=1", "cells.indoor=1", "area.seed=2"]
 

@@ -13,7 +13,7 @@ from mapfilter.survey.measurement_rows import most_frequent
 from mapfilter.survey.read_measurements import read_measurements
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.workflows.convert import run_convert
-from mapfilter.workflows.measured import recorded_rows
+from mapfilter.workflows.inputs.measured import recorded_rows
 
 UTM = OpenOptions(combine=CombineOptions(crs="EPSG:32635"))
 

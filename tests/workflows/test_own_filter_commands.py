@@ -12,7 +12,7 @@ from mapfilter.config.sections import FilterSection
 from mapfilter.experiments.sweep.table import read_runs
 from mapfilter.positioning.estimate_store import read_estimate
 from mapfilter.positioning.locators import BUILT_IN, filter_options
-from mapfilter.workflows.filter_choice import filter_choice
+from mapfilter.workflows.inputs.filter_choice import filter_choice
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "howto" / "own-filter.rst"
 MINE = "my_filter_of_the_docs:MyFilter"

@@ -14,11 +14,16 @@ from mapfilter.models.level_memory import LevelMemory
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.tracks.store import read_log
-from mapfilter.workflows import bench_filter
-from mapfilter.workflows import bench_peers as bench_peers_module
 from mapfilter.workflows.bench import run_bench
-from mapfilter.workflows.bench_numpy import MAP, NumpyModel, numpy_step, systematic_indices
-from mapfilter.workflows.bench_peers import (
+from mapfilter.workflows.benchmarks import filter as bench_filter
+from mapfilter.workflows.benchmarks import peers as bench_peers_module
+from mapfilter.workflows.benchmarks.numpy_reference import (
+    MAP,
+    NumpyModel,
+    numpy_step,
+    systematic_indices,
+)
+from mapfilter.workflows.benchmarks.peers import (
     PACKAGES,
     bench_peers,
     compare,
@@ -218,6 +223,6 @@ def test_a_peer_without_what_it_needs_is_named(monkeypatch):
     def lacking(*_):
         raise ModuleNotFoundError("No module named 'ordered_set'", name="ordered_set")
 
-    monkeypatch.setattr("mapfilter.workflows.bench_peers.stone_soup_step", lacking)
+    monkeypatch.setattr("mapfilter.workflows.benchmarks.peers.stone_soup_step", lacking)
     with pytest.raises(MapfilterError, match="no module ordered_set"):
         bench_peers(runs=1, particles=(400,), settings=SMALL)

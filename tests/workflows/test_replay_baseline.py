@@ -11,8 +11,8 @@ import mapfilter as mf
 from mapfilter.positioning.fingerprints.locating import fit_locator, locate_by, usual_readings
 from mapfilter.positioning.fingerprints.options import Probabilistic
 from mapfilter.positioning.fingerprints.sources import reports_of_database, reports_of_logs
-from mapfilter.workflows import replay_logs
-from mapfilter.workflows.replay_baseline import MOST_REPORTS, Baselines, SingleReports, together
+from mapfilter.workflows.replays import logs as replay_logs
+from mapfilter.workflows.replays.baseline import MOST_REPORTS, Baselines, SingleReports, together
 
 
 def test_a_replay_shows_what_single_reports_would(log, replay, world, tmp_path):

@@ -2,7 +2,7 @@
 
 from types import SimpleNamespace
 
-from mapfilter.workflows.replayed import _shared_notes
+from mapfilter.workflows.replays.figures import _shared_notes
 
 TOLD = "motion.csv: steps of 3 rows are above 10 km/h"
 

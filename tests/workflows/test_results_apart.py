@@ -6,7 +6,7 @@ import shutil
 import pytest
 from command_line import ONE, assert_done, assert_refused, contents, mapfilter, settings
 
-from mapfilter.workflows import replay_log
+from mapfilter.workflows.replays import located_log as replay_log
 
 
 @pytest.fixture(scope="module")

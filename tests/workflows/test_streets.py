@@ -11,7 +11,7 @@ from command_line import assert_done, assert_refused, mapfilter
 from mapfilter.config.load import load_config
 from mapfilter.database.store import open_database
 from mapfilter.geodesy import unproject
-from mapfilter.workflows.world import World
+from mapfilter.workflows.inputs.world import World
 
 CRS = "EPSG:32635"
 WEST, SOUTH = 385_800.0, 6_671_700.0

@@ -1,8 +1,8 @@
 """Results as people read them: a short table in place of a line for each cell of a grid."""
 
 from mapfilter.evaluation.success_cells import SuccessCell
-from mapfilter.workflows.result_text import text_lines
-from mapfilter.workflows.sweep_tables import brief
+from mapfilter.workflows.outputs.result_text import text_lines
+from mapfilter.workflows.sweeps.tables import brief
 
 
 def cell(**place):

@@ -12,7 +12,7 @@ import rasterio
 
 from mapfilter._printing import quiet_callbacks
 from mapfilter.errors import InputError, fail
-from mapfilter.workflows import guard, terminal
+from mapfilter.workflows.outputs import guard, terminal
 
 ACTING = "cell \x1b[2J\x07\x00\x9b31m\u202e\x7f"
 

@@ -19,8 +19,8 @@ from mapfilter._types import Floats
 from mapfilter.angles import heading_from_azimuth_rad
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import grid_convergence_rad, project
+from mapfilter.tracks.joining.sampling import sampling_sd_m
 from mapfilter.tracks.log import TrackLog, make_log
-from mapfilter.tracks.sampling import sampling_sd_m
 from mapfilter.tracks.schema import SERVING
 
 LONGEST_GAP_S = 30.0

@@ -49,7 +49,7 @@ from mapfilter.propagation.shadowing import named_rng
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.reported_power import reported_eirp_dbm
 from mapfilter.roads.corridors import Positions
-from mapfilter.tracks.identify import name_by_plan
+from mapfilter.tracks.joining.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_log import open_log
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions

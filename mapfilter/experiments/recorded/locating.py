@@ -15,9 +15,9 @@ from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.log_options import by_streets_alone, fitted_to_log
 from mapfilter.positioning.loop import locate
 from mapfilter.positioning.positioned_track import PositionedTrack
-from mapfilter.tracks.identify import name_by_plan
+from mapfilter.tracks.checks.placeless import in_frame
+from mapfilter.tracks.joining.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.placeless import in_frame
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from mapfilter._types import Floats, Ints
 from mapfilter.errors import InputError, fail
 from mapfilter.geodesy import project
 from mapfilter.roads.ways import Ways
-from mapfilter.tracks.readers.text import read_text
+from mapfilter.tracks.readers.texts.text import read_text
 
 SIGMA_M, BETA_M = 10.0, 30.0
 """Deviation of positions, and scale of the difference between route and straight line."""

@@ -12,13 +12,13 @@ from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.street_motion import MotionErrors
 from mapfilter.models.way_map import MapWeights
-from mapfilter.positioning.bayes.alternative import AlternativeRules
-from mapfilter.positioning.bayes.area_frame import AreaFrame
+from mapfilter.positioning.bayes.area.area_frame import AreaFrame
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.carriageways import carriageway_filters
-from mapfilter.positioning.bayes.evidence_options import EvidenceOptions
 from mapfilter.positioning.bayes.filter import BayesPositioner
-from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
-from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.rivals.alternative import AlternativeRules
+from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules, PullRules
+from mapfilter.positioning.bayes.sources.evidence_options import EvidenceOptions
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 
 if TYPE_CHECKING:

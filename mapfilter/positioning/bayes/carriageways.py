@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from mapfilter.filters.particle import ParticleOptions
-from mapfilter.positioning.bayes.alternative import AlternativeRules
-from mapfilter.positioning.bayes.mirrored import MirrorRules
-from mapfilter.positioning.bayes.model import BayesModel
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
+from mapfilter.positioning.bayes.rivals.alternative import AlternativeRules
+from mapfilter.positioning.bayes.rivals.mirrored import MirrorRules
 
 _LANE_SD_M = 2.0
 _NULL_NATS_PER_M = 0.06

@@ -19,12 +19,12 @@ import numpy as np
 
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.positioning.bayes.alternative import (
+from mapfilter.positioning.bayes.rivals.alternative import (
     AlternativeHypothesis,
     AlternativeRules,
     MapBelief,
 )
-from mapfilter.positioning.bayes.held import HeldOtherwise
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
 
 _NEGLIGIBLE, _CERTAIN = -9.0, 30.0
 """Log odds below which a rival is not looked at; bound above which they make no difference."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 from math import nan
 
 from mapfilter.filters.contract import Status
-from mapfilter.positioning.bayes.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.certainty import Recovery, certainty
 from mapfilter.positioning.bayes.state import BayesState
 

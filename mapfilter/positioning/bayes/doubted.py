@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from mapfilter.filters.contract import Reason
-from mapfilter.positioning.bayes.belief_filters import BeliefFilters
-from mapfilter.positioning.bayes.hold import Hold
+from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.step_output import UnusedReading

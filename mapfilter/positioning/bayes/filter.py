@@ -1,8 +1,8 @@
 """Global positioning by the Bayes map filter, one epoch after another, live or in replay.
 
 :meth:`BayesPositioner.step` moves the beliefs by dead reckoning, asks each source of evidence
-(:mod:`mapfilter.positioning.bayes.evidence`) for the epoch's log-likelihood terms, starts a belief
-or weighs it with them, and reports. Equal epochs and seeds give equal bytes.
+(:mod:`mapfilter.positioning.bayes.sources.evidence`) for the epoch's log-likelihood terms, starts a
+belief or weighs it with them, and reports. Equal epochs and seeds give equal bytes.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ from mapfilter._device import PROCESSOR, Device
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleOptions
-from mapfilter.positioning.bayes.alternative import AlternativeRules
-from mapfilter.positioning.bayes.area_frame import AreaFrame
-from mapfilter.positioning.bayes.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.area.area_frame import AreaFrame
+from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.beliefs.first_hypotheses import Start
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
+from mapfilter.positioning.bayes.beliefs.moving import moved
+from mapfilter.positioning.bayes.beliefs.smoothing import BayesSmoother
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
 from mapfilter.positioning.bayes.claims import judged
 from mapfilter.positioning.bayes.doubted import doubted
-from mapfilter.positioning.bayes.evidence import EvidenceSource, EvidenceUpdate
-from mapfilter.positioning.bayes.first_hypotheses import Start
-from mapfilter.positioning.bayes.hold_rules import HoldRules, PullRules
 from mapfilter.positioning.bayes.maker import Maker
-from mapfilter.positioning.bayes.map_source import MapSource
-from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.bayes.moving import moved
-from mapfilter.positioning.bayes.radio import RadioSource
-from mapfilter.positioning.bayes.smoothing import BayesSmoother
+from mapfilter.positioning.bayes.rivals.alternative import AlternativeRules
+from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules, PullRules
+from mapfilter.positioning.bayes.rivals.transitions import report
+from mapfilter.positioning.bayes.sources.evidence import EvidenceSource, EvidenceUpdate
+from mapfilter.positioning.bayes.sources.map_source import MapSource
+from mapfilter.positioning.bayes.sources.radio import RadioSource
+from mapfilter.positioning.bayes.sources.timing import TimingSource
+from mapfilter.positioning.bayes.sources.usable import usable_epoch
 from mapfilter.positioning.bayes.state import BayesState, check_state, step_output
-from mapfilter.positioning.bayes.timing import TimingSource
-from mapfilter.positioning.bayes.transitions import report
-from mapfilter.positioning.bayes.usable import usable_epoch
 from mapfilter.positioning.bayes.warm_up import run_kernels
 from mapfilter.positioning.bayes.weighing import Weighing
 from mapfilter.positioning.epoch_checks import check_epoch

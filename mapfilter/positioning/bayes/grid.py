@@ -23,13 +23,13 @@ from mapfilter.filters.grid_transport import Spread, Transport
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.models.street_motion import BIAS, EAST, NORTH, OFF, STATES
 from mapfilter.models.way_spread import LEAST_LOG, ways_exponent
-from mapfilter.positioning.bayes.evidence import RadioReading
-from mapfilter.positioning.bayes.first_hypotheses import Start
-from mapfilter.positioning.bayes.model import BayesModel
-from mapfilter.positioning.bayes.path_start import OFF_AT_START
+from mapfilter.positioning.bayes.beliefs.first_hypotheses import Start
+from mapfilter.positioning.bayes.beliefs.model import BayesModel
+from mapfilter.positioning.bayes.beliefs.path_start import OFF_AT_START
+from mapfilter.positioning.bayes.sources.evidence import RadioReading
 
 if TYPE_CHECKING:
-    from mapfilter.positioning.bayes.device_step import DeviceStep
+    from mapfilter.positioning.bayes.beliefs.device_step import DeviceStep
 
 _CIRCLE_BINS = 72
 _LEAST_START_SD_M = 1e-3
@@ -76,7 +76,7 @@ class StreetGrid:
     @cached_property
     def _on_device(self) -> DeviceStep:
         # Its kernels take a while to import.
-        from mapfilter.positioning.bayes.device_step import DeviceStep
+        from mapfilter.positioning.bayes.beliefs.device_step import DeviceStep
 
         return DeviceStep(self.model, self.device)
 

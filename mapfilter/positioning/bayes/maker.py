@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mapfilter.positioning.bayes.area_frame import AreaFrame
+    from mapfilter.positioning.bayes.area.area_frame import AreaFrame
     from mapfilter.positioning.bayes.filter import BayesPositioner
 
 _OF_OPTIONS = ("model", "carriageways", "maker")

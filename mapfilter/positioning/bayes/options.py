@@ -13,12 +13,12 @@ from mapfilter._device import PROCESSOR, Device, DeviceName, open_device
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults
 from mapfilter.options import Below1, NotNegative, Options, Positive, Probability
-from mapfilter.positioning.bayes.area_frame import AreaFrame
-from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.area.area_frame import AreaFrame
+from mapfilter.positioning.bayes.area.area_map import AreaMap
+from mapfilter.positioning.bayes.area.opened_area import open_area
 from mapfilter.positioning.bayes.assembly import assembled
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.maker import Maker, made_over_area
-from mapfilter.positioning.bayes.opened_area import open_area
 from mapfilter.positioning.bayes.over_survey import (
     SURVEYED,
     SURVEYED_WAYS,

@@ -20,10 +20,10 @@ from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.models.fingerprint import ServingWeights
 from mapfilter.models.measured_map import MeasuredMapOptions, MeasuredRows, ServingStatistics
 from mapfilter.options import NotNegative, Options, Positive
-from mapfilter.positioning.bayes.area_map import AreaMap
+from mapfilter.positioning.bayes.area.area_map import AreaMap
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.maker import Maker
-from mapfilter.positioning.bayes.measured_model import MeasuredMapModel
+from mapfilter.positioning.bayes.sources.measured_model import MeasuredMapModel
 from mapfilter.radio.cells import Cell
 
 SURVEYED: Mapping[str, float] = {

@@ -11,14 +11,18 @@ from mapfilter.errors import InputError, fail
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import empty_summary
 from mapfilter.models.street_motion import STATES
-from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief, NullHypothesis
-from mapfilter.positioning.bayes.area_frame import AreaFrame
+from mapfilter.positioning.bayes.area.area_frame import AreaFrame
+from mapfilter.positioning.bayes.beliefs.path import DeadReckoning as DeadReckoning
+from mapfilter.positioning.bayes.beliefs.path import RecentPath
 from mapfilter.positioning.bayes.certainty import Recovery
-from mapfilter.positioning.bayes.held import HeldOtherwise
-from mapfilter.positioning.bayes.hold import Hold
-from mapfilter.positioning.bayes.mirrored import MirroredTwin
-from mapfilter.positioning.bayes.path import DeadReckoning as DeadReckoning
-from mapfilter.positioning.bayes.path import RecentPath
+from mapfilter.positioning.bayes.rivals.alternative import (
+    AlternativeHypothesis,
+    MapBelief,
+    NullHypothesis,
+)
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
+from mapfilter.positioning.bayes.rivals.hold import Hold
+from mapfilter.positioning.bayes.rivals.mirrored import MirroredTwin
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.integrity import sample_tail
 from mapfilter.positioning.sensors.watch import SensorWatch

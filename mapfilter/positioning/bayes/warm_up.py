@@ -10,7 +10,7 @@ import numpy as np
 from mapfilter.filters.contract import MotionStep
 from mapfilter.models.fingerprint import BoundReading
 from mapfilter.models.level_errors import LevelReport
-from mapfilter.positioning.bayes.evidence import RadioReading
+from mapfilter.positioning.bayes.sources.evidence import RadioReading
 from mapfilter.positioning.epochs import Epoch
 
 if TYPE_CHECKING:

@@ -11,37 +11,37 @@ import numpy as np
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.grid import GridBelief
-from mapfilter.positioning.bayes.alternative import (
+from mapfilter.positioning.bayes.area.area_frame import AreaFrame
+from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.beliefs.new_beliefs import NewBeliefs
+from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
+from mapfilter.positioning.bayes.rivals.alternative import (
     AlternativeHypothesis,
     MapBelief,
     NullHypothesis,
 )
-from mapfilter.positioning.bayes.area_frame import AreaFrame
-from mapfilter.positioning.bayes.belief_filters import BeliefFilters
-from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
-from mapfilter.positioning.bayes.contradicted import misreads
-from mapfilter.positioning.bayes.evidence import (
+from mapfilter.positioning.bayes.rivals.contradicted import misreads
+from mapfilter.positioning.bayes.rivals.rivals import Rivals, challenged, for_belief
+from mapfilter.positioning.bayes.rivals.step_units import (
+    asks_for_unit,
+    hold_after_takeover,
+    is_unit_open,
+)
+from mapfilter.positioning.bayes.rivals.transitions import (
+    Resolution,
+    doubted,
+    resolve_alternative,
+)
+from mapfilter.positioning.bayes.rivals.unaided import beside_alternative
+from mapfilter.positioning.bayes.sources.evidence import (
     Context,
     EvidenceSource,
     EvidenceUpdate,
     RadioReading,
     joined,
 )
-from mapfilter.positioning.bayes.new_beliefs import NewBeliefs
-from mapfilter.positioning.bayes.radio import RadioSource
-from mapfilter.positioning.bayes.rivals import Rivals, challenged, for_belief
+from mapfilter.positioning.bayes.sources.radio import RadioSource
 from mapfilter.positioning.bayes.state import BayesState
-from mapfilter.positioning.bayes.step_units import (
-    asks_for_unit,
-    hold_after_takeover,
-    is_unit_open,
-)
-from mapfilter.positioning.bayes.transitions import (
-    Resolution,
-    doubted,
-    resolve_alternative,
-)
-from mapfilter.positioning.bayes.unaided import beside_alternative
 from mapfilter.positioning.epochs import Epoch
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from mapfilter._types import Floats, Floats32
 from mapfilter.models.street_motion import EAST, NORTH
-from mapfilter.positioning.bayes.alternative import MapBelief
+from mapfilter.positioning.bayes.rivals.alternative import MapBelief
 from mapfilter.positioning.epochs import FIX_SD_M, GnssFix
 
 _F = np.float32

@@ -19,8 +19,8 @@ import numpy as np
 from mapfilter._types import Bools, Floats
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.positioning.bayes.alternative import MapBelief
-from mapfilter.positioning.bayes.evidence import FixedTerm, Term
+from mapfilter.positioning.bayes.rivals.alternative import MapBelief
+from mapfilter.positioning.bayes.sources.evidence import FixedTerm, Term
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.gnss.fixes import (
     FixTerm,

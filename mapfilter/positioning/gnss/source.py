@@ -15,9 +15,9 @@ import numpy as np
 
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Status
-from mapfilter.positioning.bayes.alternative import AlternativeHypothesis, MapBelief
-from mapfilter.positioning.bayes.area_frame import AreaFrame
-from mapfilter.positioning.bayes.evidence import Context, EvidenceSource, EvidenceUpdate
+from mapfilter.positioning.bayes.area.area_frame import AreaFrame
+from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, MapBelief
+from mapfilter.positioning.bayes.sources.evidence import Context, EvidenceSource, EvidenceUpdate
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.gnss.fixes import FixTerm, agrees_with, widened

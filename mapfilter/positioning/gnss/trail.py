@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mapfilter._types import Bools, Floats
-from mapfilter.positioning.bayes.path import DeadReckoning
+from mapfilter.positioning.bayes.beliefs.path import DeadReckoning
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.gnss.fixes import widened
 

@@ -11,7 +11,7 @@ from math import exp, expm1, isfinite, nan
 from typing import NamedTuple
 
 from mapfilter.filters.contract import MotionStep
-from mapfilter.tracks.speeds import walkers_unit_m
+from mapfilter.tracks.checks.speeds import walkers_unit_m
 
 GAP_INTERVALS = 3.0
 """After so many intervals of the log motion rows are missing."""

@@ -12,7 +12,7 @@ from mapfilter._constants import MAD_TO_SD
 from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.angles import heading_from_azimuth_rad, wrap_rad
-from mapfilter.tracks.headings import compass_fault
+from mapfilter.tracks.checks.headings import compass_fault
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.pdr.batches import parted, spread
 from mapfilter.tracks.pdr.gyroscope import RATE_SD_RADPS

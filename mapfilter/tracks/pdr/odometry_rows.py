@@ -8,7 +8,7 @@ import pandas as pd
 from mapfilter._types import Bools, Floats
 from mapfilter._words import number_of
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.moved import odometry_gaps
+from mapfilter.tracks.joining.moved import odometry_gaps
 
 _JUMP_MPS, _JUMP_MPS2 = 15.0, 30.0
 """Three times what brakes reach."""

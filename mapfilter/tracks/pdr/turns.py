@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Floats
-from mapfilter.tracks.equal_times import joined_times
+from mapfilter.tracks.joining.equal_times import joined_times
 from mapfilter.tracks.pdr.gyroscope import WALK_RAD_PER_SQRT_S, sample_noise
 
 AXES = ("x_mps2", "y_mps2", "z_mps2")

@@ -11,9 +11,14 @@ import pandas as pd
 from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.angles import wrap_rad
-from mapfilter.tracks.equal_times import joined_times
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.moved import UNDIRECTED, long_gaps, motion_from_odometry, odometry_gaps
+from mapfilter.tracks.joining.equal_times import joined_times
+from mapfilter.tracks.joining.moved import (
+    UNDIRECTED,
+    long_gaps,
+    motion_from_odometry,
+    odometry_gaps,
+)
 from mapfilter.tracks.pdr.attitude import attitude
 from mapfilter.tracks.pdr.gyroscope import error_notes
 from mapfilter.tracks.pdr.odometry_rows import gap_notes, speed_errors, usable_rows, usual_s

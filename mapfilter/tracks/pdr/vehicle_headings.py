@@ -9,9 +9,9 @@ import pandas as pd
 
 from mapfilter._types import Floats
 from mapfilter.angles import wrap_rad
-from mapfilter.tracks.equal_times import joined_times
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.moved import motion_from_odometry
+from mapfilter.tracks.joining.equal_times import joined_times
+from mapfilter.tracks.joining.moved import motion_from_odometry
 from mapfilter.tracks.pdr.gyroscope import sample_noise
 from mapfilter.tracks.pdr.odometry_rows import gap_notes, speed_errors, usable_rows
 

@@ -11,13 +11,13 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from mapfilter._types import Floats, Ints
-from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.identities import add_radio
-from mapfilter.tracks.readers.lines import blocks, line_texts
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.text import Text
+from mapfilter.tracks.readers.recorded.identities import add_radio
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Clock
+from mapfilter.tracks.readers.texts.columns import Columns
+from mapfilter.tracks.readers.texts.lines import blocks, line_texts
+from mapfilter.tracks.readers.texts.text import Text
 
 _NUMBER = r'\bNAME=\s*"?(?P<value>-?\d{1,12}(?:\.\d+)?)"?\s*(?:,|$)'
 _WORD = r'\bNAME=\s*"?(?P<value>[^",]*)'

@@ -13,11 +13,11 @@ import numpy as np
 from mapfilter._constants import KMH_MPS
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, MapfilterError, fail
+from mapfilter.tracks.readers.clocks.times import LEAST_UNIX_S
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.text import Text
-from mapfilter.tracks.readers.times import LEAST_UNIX_S
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Clock
+from mapfilter.tracks.readers.texts.text import Text
 from mapfilter.tracks.readers.unknown_formats import RAW_FRAMES
 
 _NO_SPEED_KMH = 255

@@ -11,14 +11,18 @@ from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.radio.asu import UNKNOWN_ASU
 from mapfilter.radio.identities import technology
-from mapfilter.tracks.readers.columns import Columns, changed_rows, only
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.identities import add_radio, available
 from mapfilter.tracks.readers.plain_csv import has_content
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.separated_values import header_columns, header_names, likely_separator
-from mapfilter.tracks.readers.text import Text
+from mapfilter.tracks.readers.recorded.identities import add_radio, available
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Clock
+from mapfilter.tracks.readers.texts.columns import Columns, changed_rows, only
+from mapfilter.tracks.readers.texts.separated_values import (
+    header_columns,
+    header_names,
+    likely_separator,
+)
+from mapfilter.tracks.readers.texts.text import Text
 
 _UNAVAILABLE = 1e9
 _ASU = {"GSM": (-113.0, 2.0, 31.0), "UMTS": (-120.0, 1.0, 96.0), "LTE": (-140.0, 1.0, 97.0)}

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.text import Text
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.texts.text import Text
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ from mapfilter.tracks.readers import (
     gnsslogger,
     gpx,
     indoor,
-    long_tables,
     nemo,
     nmea,
     phone_sensors,
@@ -30,11 +29,12 @@ from mapfilter.tracks.readers import (
     wigle,
 )
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Recording
-from mapfilter.tracks.readers.separated_values import header_names, likely_separator
-from mapfilter.tracks.readers.text import Text, parts_of, read_text
-from mapfilter.tracks.readers.title_lines import below_title
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Recording
+from mapfilter.tracks.readers.texts import long_tables
+from mapfilter.tracks.readers.texts.separated_values import header_names, likely_separator
+from mapfilter.tracks.readers.texts.text import Text, parts_of, read_text
+from mapfilter.tracks.readers.texts.title_lines import below_title
 from mapfilter.tracks.readers.unknown_formats import JSON, NOT_READ, unknown_format
 
 FORMATS: tuple[Format, ...] = (

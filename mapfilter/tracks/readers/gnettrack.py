@@ -11,14 +11,18 @@ from mapfilter._constants import KMH_MPS
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.radio.identities import technology
-from mapfilter.tracks.readers.columns import Columns
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.identities import add_radio, available
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.separated_values import header_columns, header_names, likely_separator
-from mapfilter.tracks.readers.stale import repeated_readings
-from mapfilter.tracks.readers.text import Text
+from mapfilter.tracks.readers.recorded.identities import add_radio, available
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Clock
+from mapfilter.tracks.readers.recorded.stale import repeated_readings
+from mapfilter.tracks.readers.texts.columns import Columns
+from mapfilter.tracks.readers.texts.separated_values import (
+    header_columns,
+    header_names,
+    likely_separator,
+)
+from mapfilter.tracks.readers.texts.text import Text
 
 _NEEDED = {"timestamp", "longitude", "latitude", "networkmode"}
 _IDENTITIES = ({"rawcellid"}, {"node", "cellid"})

@@ -10,15 +10,15 @@ from mapfilter._constants import GPS_EPOCH_S, LIGHT_MPS
 from mapfilter._types import Ints
 from mapfilter._words import number_of
 from mapfilter.gnss.almanacs import WEEK_S
-from mapfilter.tracks.readers.columns import Columns
+from mapfilter.tracks.readers.clocks.times import unix_seconds, utc_from_gps_s
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.lines import blocks
 from mapfilter.tracks.readers.plain_csv import has_content
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.separated_values import header_names, line_columns
-from mapfilter.tracks.readers.text import Text
-from mapfilter.tracks.readers.times import unix_seconds, utc_from_gps_s
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Clock
+from mapfilter.tracks.readers.texts.columns import Columns
+from mapfilter.tracks.readers.texts.lines import blocks
+from mapfilter.tracks.readers.texts.separated_values import header_names, line_columns
+from mapfilter.tracks.readers.texts.text import Text
 
 _BLOCK_BYTES = 1 << 24
 _DAY_NS, _WEEK_NS = 86_400 * 10**9, int(WEEK_S) * 10**9

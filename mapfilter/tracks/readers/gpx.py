@@ -15,12 +15,12 @@ import pyarrow.compute as pc
 
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import InputError, fail
-from mapfilter.tracks.position_units import UERE_M
-from mapfilter.tracks.readers.columns import Columns
+from mapfilter.tracks.joining.position_units import UERE_M
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.text import Text
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Clock
+from mapfilter.tracks.readers.texts.columns import Columns
+from mapfilter.tracks.readers.texts.text import Text
 
 _POINTS = ("trkpt", "wpt", "rtept")
 _PART_BYTES = 1 << 22

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from mapfilter.tracks.readers.columns import Columns
+from mapfilter.tracks.readers.clocks.times import unix_seconds
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.grouped import Groups, columns_of, group_lines
-from mapfilter.tracks.readers.identities import add_radio
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.text import Text
-from mapfilter.tracks.readers.times import unix_seconds
+from mapfilter.tracks.readers.recorded.identities import add_radio
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Clock
+from mapfilter.tracks.readers.texts.columns import Columns
+from mapfilter.tracks.readers.texts.grouped import Groups, columns_of, group_lines
+from mapfilter.tracks.readers.texts.text import Text
 
 _SENSORS = {
     "TYPE_ACCELEROMETER": ("accelerometer", "mps2"),

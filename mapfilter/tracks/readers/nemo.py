@@ -37,12 +37,9 @@ import numpy as np
 from mapfilter._constants import KMH_MPS
 from mapfilter._types import Ints
 from mapfilter._words import number_of
-from mapfilter.tracks.readers.columns import only
-from mapfilter.tracks.readers.events import Events, read_events
+from mapfilter.tracks.readers.clocks.local_parts import note_changes
+from mapfilter.tracks.readers.clocks.local_times import utc_from_local_s
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.identities import add_radio, available
-from mapfilter.tracks.readers.local_parts import note_changes
-from mapfilter.tracks.readers.local_times import utc_from_local_s
 from mapfilter.tracks.readers.nemo_identities import (
     Identities,
     context_size,
@@ -52,10 +49,13 @@ from mapfilter.tracks.readers.nemo_identities import (
     of_systems,
 )
 from mapfilter.tracks.readers.plain_csv import has_content
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.separated_values import header_names, likely_separator
-from mapfilter.tracks.readers.text import Text
+from mapfilter.tracks.readers.recorded.identities import add_radio, available
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Clock
+from mapfilter.tracks.readers.texts.columns import only
+from mapfilter.tracks.readers.texts.events import Events, read_events
+from mapfilter.tracks.readers.texts.separated_values import header_names, likely_separator
+from mapfilter.tracks.readers.texts.text import Text
 
 _BEGIN = re.compile(r"#(?:PRODUCT|FF|ID|START)[,;\t]")
 _EVENT = re.compile(r"(?:GPS|CELLMEAS|CHI|SEI|RRCSM|L3SM)([,;\t])\d{1,2}:\d\d:\d\d[.,]\d{1,3}\1")

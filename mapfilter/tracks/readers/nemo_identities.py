@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapfilter._types import Bools, Floats, Ints
-from mapfilter.tracks.readers.events import Events
-from mapfilter.tracks.readers.identities import available
+from mapfilter.tracks.readers.recorded.identities import available
+from mapfilter.tracks.readers.texts.events import Events
 
 _MOST_CONTEXTS = 64
 _DEDICATED = 5.0

@@ -10,15 +10,15 @@ import pandas as pd
 
 from mapfilter._constants import DAY_S, KNOT_MPS
 from mapfilter._types import Floats, Ints
-from mapfilter.tracks.position_units import RADIUS_68, UERE_M
-from mapfilter.tracks.readers.columns import Columns
+from mapfilter.tracks.joining.position_units import RADIUS_68, UERE_M
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.nmea_sentences import sentences
 from mapfilter.tracks.readers.nmea_stamps import stamped_dates
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.separated_values import line_columns
-from mapfilter.tracks.readers.text import Text
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Clock
+from mapfilter.tracks.readers.texts.columns import Columns
+from mapfilter.tracks.readers.texts.separated_values import line_columns
+from mapfilter.tracks.readers.texts.text import Text
 
 _STAMP = rb"[^$!,;\t]{0,48}(?:[,;\t][^$!,;\t]{0,48}){0,2}"
 _SENTENCE = re.compile(rb"\A" + _STAMP + rb"[$!]([A-Z]{2}|P)([A-Z]{3})[,\d]")

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapfilter._types import Bools, Ints
-from mapfilter.tracks.readers.lines import blocks
-from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.texts.lines import blocks
 
 _LINE_FEED = 10
 _DIGITS = np.array([int(c, 16) if (c := chr(i)) in hexdigits else -1 for i in range(256)])

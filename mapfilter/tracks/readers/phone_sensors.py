@@ -11,16 +11,20 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.errors import InputError, MapfilterError, fail
-from mapfilter.tracks.readers.columns import Columns
-from mapfilter.tracks.readers.csv_fields import usual_fields
-from mapfilter.tracks.readers.csv_headers import stated_fields
+from mapfilter.tracks.readers.clocks.times import unix_seconds
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.separated_values import header_columns, header_names, likely_separator
-from mapfilter.tracks.readers.text import Text, read_text
-from mapfilter.tracks.readers.times import unix_seconds
-from mapfilter.tracks.readers.zipped import has_recording
+from mapfilter.tracks.readers.plain.fields import usual_fields
+from mapfilter.tracks.readers.plain.headers import stated_fields
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Clock
+from mapfilter.tracks.readers.texts.columns import Columns
+from mapfilter.tracks.readers.texts.separated_values import (
+    header_columns,
+    header_names,
+    likely_separator,
+)
+from mapfilter.tracks.readers.texts.text import Text, read_text
+from mapfilter.tracks.readers.texts.zipped import has_recording
 
 _AXES = ("x", "y", "z")
 _UNITS = {

@@ -9,13 +9,13 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.errors import listed
-from mapfilter.tracks.readers.columns import Columns
-from mapfilter.tracks.readers.csv_app_names import full_names, with_full_names
-from mapfilter.tracks.readers.csv_attitude import add_attitude
-from mapfilter.tracks.readers.csv_cells import add_cells
-from mapfilter.tracks.readers.csv_fields import FIELDS, usual_fields
-from mapfilter.tracks.readers.csv_headers import stated_fields
-from mapfilter.tracks.readers.csv_mapped import (
+from mapfilter.tracks.readers.format import Format, ReadOptions
+from mapfilter.tracks.readers.plain.app_names import full_names, with_full_names
+from mapfilter.tracks.readers.plain.attitude import add_attitude
+from mapfilter.tracks.readers.plain.cells import add_cells
+from mapfilter.tracks.readers.plain.fields import FIELDS, usual_fields
+from mapfilter.tracks.readers.plain.headers import stated_fields
+from mapfilter.tracks.readers.plain.mapped import (
     NAMED_CELLS,
     SIGNALS,
     Mapped,
@@ -23,17 +23,21 @@ from mapfilter.tracks.readers.csv_mapped import (
     mapped_columns,
     with_dates,
 )
-from mapfilter.tracks.readers.csv_odometry import add_odometry, add_turns
-from mapfilter.tracks.readers.csv_places import add_places, hemisphere_columns
-from mapfilter.tracks.readers.csv_steps import add_steps, are_counted
-from mapfilter.tracks.readers.csv_technology import with_technologies
-from mapfilter.tracks.readers.csv_times import times_of
-from mapfilter.tracks.readers.csv_unused import unused_columns, unused_note
-from mapfilter.tracks.readers.csv_weeks import week_column
-from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.separated_values import header_columns, header_names, likely_separator
-from mapfilter.tracks.readers.text import Text
+from mapfilter.tracks.readers.plain.odometry import add_odometry, add_turns
+from mapfilter.tracks.readers.plain.places import add_places, hemisphere_columns
+from mapfilter.tracks.readers.plain.steps import add_steps, are_counted
+from mapfilter.tracks.readers.plain.technology import with_technologies
+from mapfilter.tracks.readers.plain.times import times_of
+from mapfilter.tracks.readers.plain.unused import unused_columns, unused_note
+from mapfilter.tracks.readers.plain.weeks import week_column
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.texts.columns import Columns
+from mapfilter.tracks.readers.texts.separated_values import (
+    header_columns,
+    header_names,
+    likely_separator,
+)
+from mapfilter.tracks.readers.texts.text import Text
 
 _SPEEDS = ("speed_mps", "speed_kmh")
 _CONTENT = (

@@ -11,22 +11,22 @@ import numpy as np
 
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import MapfilterError
-from mapfilter.tracks.readers.columns import Columns
-from mapfilter.tracks.readers.csv_fields import usual_fields
-from mapfilter.tracks.readers.csv_headers import stated_fields
+from mapfilter.tracks.readers.clocks.times import LEAST_UNIX_S
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.lines import blocks
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.separated_values import (
+from mapfilter.tracks.readers.plain.fields import usual_fields
+from mapfilter.tracks.readers.plain.headers import stated_fields
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Clock
+from mapfilter.tracks.readers.texts.columns import Columns
+from mapfilter.tracks.readers.texts.lines import blocks
+from mapfilter.tracks.readers.texts.separated_values import (
     header_names,
     likely_separator,
     split_blanks,
     value_columns,
 )
-from mapfilter.tracks.readers.text import Text, read_text
-from mapfilter.tracks.readers.times import LEAST_UNIX_S
-from mapfilter.tracks.readers.zipped import has_recording
+from mapfilter.tracks.readers.texts.text import Text, read_text
+from mapfilter.tracks.readers.texts.zipped import has_recording
 
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d{1,3})?|[-+]?(nan|inf)", re.IGNORECASE)
 _PLACE = re.compile(r"(t|p|pos|position)?[_ .]?x([_ ]?m| ?[\[(].*)?")

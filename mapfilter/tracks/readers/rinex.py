@@ -12,13 +12,13 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 
 from mapfilter._constants import GPS_EPOCH_S
+from mapfilter.tracks.readers.clocks.times import utc_from_gps_s
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Clock
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Clock
 from mapfilter.tracks.readers.rinex2_epochs import read_epochs2
 from mapfilter.tracks.readers.rinex_epochs import Observations, Wanted, read_epochs
-from mapfilter.tracks.readers.text import Text
-from mapfilter.tracks.readers.times import utc_from_gps_s
+from mapfilter.tracks.readers.texts.text import Text
 
 _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eEdD][-+]?\d+)?")
 _BEIDOU_BEHIND_S = 14.0

@@ -11,9 +11,9 @@ import numpy as np
 import pyarrow as pa
 
 from mapfilter._constants import GPS_EPOCH_S
-from mapfilter.tracks.readers.lines import blocks, line_texts
-from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.rinex_epochs import Observations, Records, Wanted, observed
+from mapfilter.tracks.readers.texts.lines import blocks, line_texts
 
 _DATE = re.compile(
     rb"(\d{1,4})\s+(\d{1,2})\s+(\d{1,2})\s+(\d{1,2})\s+(\d{1,2})\s+(\d{1,2}(?:\.\d*)?)"

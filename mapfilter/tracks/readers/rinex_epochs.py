@@ -12,8 +12,8 @@ import pyarrow.compute as pc
 
 from mapfilter._constants import GPS_EPOCH_S
 from mapfilter._types import Bools, Floats, Ints
-from mapfilter.tracks.readers.lines import blocks, line_texts
-from mapfilter.tracks.readers.reading import Reading
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.texts.lines import blocks, line_texts
 
 _DATE = (
     r"^\s*(?P<year>\d{4})\s+(?P<month>\d{1,2})\s+(?P<day>\d{1,2})\s+(?P<hour>\d{1,2})"

@@ -11,9 +11,10 @@ import numpy as np
 from mapfilter._constants import DAY_S
 from mapfilter._words import number_of
 from mapfilter.gnss.almanacs import WEEK_S
+from mapfilter.tracks.readers.clocks.times import utc_from_gps_s
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Clock
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Clock
 from mapfilter.tracks.readers.rinex import (
     Lines,
     fixed_number,
@@ -21,8 +22,7 @@ from mapfilter.tracks.readers.rinex import (
     read_header,
     rinex_kind,
 )
-from mapfilter.tracks.readers.text import Text
-from mapfilter.tracks.readers.times import utc_from_gps_s
+from mapfilter.tracks.readers.texts.text import Text
 
 _ELEMENTS = (
     *("iode", "crs", "delta_n", "m0"),

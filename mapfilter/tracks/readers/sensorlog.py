@@ -8,13 +8,17 @@ import numpy as np
 
 from mapfilter._constants import GRAVITY_MPS2
 from mapfilter._types import Floats
-from mapfilter.tracks.readers.columns import Columns, changed_rows, only
-from mapfilter.tracks.readers.csv_mapped import add_rows
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.separated_values import header_columns, header_names, likely_separator
-from mapfilter.tracks.readers.text import Text
+from mapfilter.tracks.readers.plain.mapped import add_rows
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Clock
+from mapfilter.tracks.readers.texts.columns import Columns, changed_rows, only
+from mapfilter.tracks.readers.texts.separated_values import (
+    header_columns,
+    header_names,
+    likely_separator,
+)
+from mapfilter.tracks.readers.texts.text import Text
 
 _AXES = ("x", "y", "z")
 _TIME = "loggingtime"

@@ -9,13 +9,13 @@ from pyproj import Transformer
 
 from mapfilter._types import Floats
 from mapfilter.gnss.earth_rotation import in_frame_of_reception
+from mapfilter.tracks.readers.clocks.times import utc_from_week_s
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.grouped import columns_of, group_lines
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.separated_values import header_columns, split_blanks
-from mapfilter.tracks.readers.text import Text
-from mapfilter.tracks.readers.times import utc_from_week_s
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Clock
+from mapfilter.tracks.readers.texts.grouped import columns_of, group_lines
+from mapfilter.tracks.readers.texts.separated_values import header_columns, split_blanks
+from mapfilter.tracks.readers.texts.text import Text
 
 _RANGES = ("pseudorange3", "range3")
 _KNOWN = frozenset({*_RANGES, "odom3", "point3"})

@@ -31,15 +31,19 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Bools, Floats
-from mapfilter.tracks.readers.columns import Columns, only
+from mapfilter.tracks.readers.clocks.times import without_midnights
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.identities import add_radio, available
 from mapfilter.tracks.readers.plain_csv import has_content
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.separated_values import header_columns, header_names, likely_separator
-from mapfilter.tracks.readers.text import Text
-from mapfilter.tracks.readers.times import without_midnights
+from mapfilter.tracks.readers.recorded.identities import add_radio, available
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Clock
+from mapfilter.tracks.readers.texts.columns import Columns, only
+from mapfilter.tracks.readers.texts.separated_values import (
+    header_columns,
+    header_names,
+    likely_separator,
+)
+from mapfilter.tracks.readers.texts.text import Text
 
 _TIMES = ("timestamp", "time")
 _LAT = ("latitude", "latitude decimal degree")

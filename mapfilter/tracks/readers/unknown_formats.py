@@ -10,12 +10,12 @@ from pathlib import Path
 
 from mapfilter._header_units import parted_unit
 from mapfilter.errors import InputError, MapfilterError, fail, listed
-from mapfilter.tracks.readers.csv_fields import by_unit, usual_fields
-from mapfilter.tracks.readers.csv_headers import likely_fields, stated_fields
-from mapfilter.tracks.readers.csv_unused import OF_WHEELS
 from mapfilter.tracks.readers.format import Format
-from mapfilter.tracks.readers.separated_values import header_names, likely_separator
-from mapfilter.tracks.readers.text import Text
+from mapfilter.tracks.readers.plain.fields import by_unit, usual_fields
+from mapfilter.tracks.readers.plain.headers import likely_fields, stated_fields
+from mapfilter.tracks.readers.plain.unused import OF_WHEELS
+from mapfilter.tracks.readers.texts.separated_values import header_names, likely_separator
+from mapfilter.tracks.readers.texts.text import Text
 
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
 _CELLS, _PLACES = {"cell", "cgi", "ci"}, {"lat_deg", "lon_deg", "east_m", "north_m"}

@@ -11,13 +11,17 @@ import numpy as np
 from mapfilter._types import Bools, Floats
 from mapfilter._words import number_of
 from mapfilter.radio.identities import technology
-from mapfilter.tracks.readers.columns import Columns, changed_rows, only
 from mapfilter.tracks.readers.format import Format, ReadOptions
-from mapfilter.tracks.readers.identities import add_radio, parse_identities
-from mapfilter.tracks.readers.reading import Reading
-from mapfilter.tracks.readers.recording import Clock
-from mapfilter.tracks.readers.separated_values import header_columns, header_names, likely_separator
-from mapfilter.tracks.readers.text import Text
+from mapfilter.tracks.readers.recorded.identities import add_radio, parse_identities
+from mapfilter.tracks.readers.recorded.reading import Reading
+from mapfilter.tracks.readers.recorded.recording import Clock
+from mapfilter.tracks.readers.texts.columns import Columns, changed_rows, only
+from mapfilter.tracks.readers.texts.separated_values import (
+    header_columns,
+    header_names,
+    likely_separator,
+)
+from mapfilter.tracks.readers.texts.text import Text
 
 _TITLE = "wiglewifi-"
 _COLUMNS = {"mac", "firstseen", "rssi", "currentlatitude", "currentlongitude", "type"}

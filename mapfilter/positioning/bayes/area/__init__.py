@@ -1,0 +1,1 @@
+"""The area of the map filter: levels and ways, as a whole or by tiles."""

@@ -1,0 +1,1 @@
+"""Single beliefs: their first hypotheses, motion, paths, and smoothing."""

@@ -1,0 +1,85 @@
+"""Changes of single beliefs besides steps: hypotheses carried on after a rest, phones turned."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import radians, sqrt
+
+import numpy as np
+
+from mapfilter.angles import wrap_one_rad, wrap_rad
+from mapfilter.filters.contract import Status
+from mapfilter.filters.grid import GridBelief
+from mapfilter.filters.particle import ParticleBelief
+from mapfilter.models.street_motion import BIAS, NORTH, MotionErrors
+from mapfilter.models.street_motion import remounted as remounted_states
+from mapfilter.positioning.bayes.rivals.alternative import MapBelief
+from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
+from mapfilter.positioning.sensors.rest import Rest
+from mapfilter.positioning.sensors.unmeasured import spread_m2
+
+
+def carried_on(belief: MapBelief, rest: Rest, gone_s: float, rng: np.random.Generator) -> MapBelief:
+    """Move some hypotheses to where they may be by now, once steps are counted as before.
+
+    ``rest`` was the rest, ``gone_s`` the time without steps, or with few. A rest whose levels were
+    in doubt may have been a way, a stroll a longer one.
+    """
+    if not isinstance(belief, ParticleBelief):
+        return belief
+    count = belief.log_weight.size
+    gone = rng.random(count) < rest.left_probability
+    far_m = sqrt(spread_m2(rest.missed_mps(gone_s), gone_s) / 2)
+    moved = belief.state.copy()
+    moved[: NORTH + 1, gone] += far_m * rng.standard_normal((NORTH + 1, int(gone.sum())))
+    return replace(belief, state=moved)
+
+
+def turned_at_jump(
+    belief: MapBelief, rules: HoldRules, changed_rad: float, rng: np.random.Generator
+) -> MapBelief:
+    """Turn the phone of some hypotheses of a search where its heading jumped.
+
+    They walk straight on; the others have turned a corner there.
+
+    Parameters
+    ----------
+    belief : MapBelief
+        Before the step; one on a grid is returned as it is.
+    rules : HoldRules
+    changed_rad : float
+        Change of the direction that headings stand for, from the row before.
+    rng : numpy.random.Generator
+    """
+    if isinstance(belief, GridBelief):
+        return belief
+    around = abs(wrap_one_rad(changed_rad)) > radians(rules.around_deg)
+    probability = rules.around_probability if around else rules.probability
+    chosen = rng.random(belief.log_weight.size) < probability
+    state = belief.state.copy()
+    state[BIAS, chosen] = wrap_rad(state[BIAS, chosen] - changed_rad)
+    return replace(belief, state=state)
+
+
+def counted_from(belief: MapBelief, heading_rad: float) -> MapBelief:
+    """Return a belief whose courses are errors of a heading, the first one that is measured."""
+    if not isinstance(belief, ParticleBelief):
+        return belief
+    state = belief.state.copy()
+    state[BIAS] = wrap_rad(state[BIAS] - np.float32(heading_rad))
+    return replace(belief, state=state)
+
+
+def remounted(
+    belief: MapBelief, motion: MotionErrors, length_m: float, rng: np.random.Generator
+) -> MapBelief:
+    """Turn the phone of some hypotheses, once a position is tracked.
+
+    A search would find more places that fit.
+    """
+    if isinstance(belief, GridBelief) or belief.status is not Status.TRACKING:
+        return belief
+    if not (length_m > 0 and motion.remounts_per_m > 0):
+        return belief
+    state = remounted_states(belief.state, length_m, motion, rng)
+    return belief if state is belief.state else replace(belief, state=state)

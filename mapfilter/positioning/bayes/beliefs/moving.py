@@ -1,0 +1,282 @@
+"""The motion of an epoch: beliefs, dead reckoning and the recent path moved by its steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import isfinite, nan
+from typing import Any
+
+import numpy as np
+
+from mapfilter.filters.contract import MotionStep, Reason, Status
+from mapfilter.filters.particle import ParticleBelief
+from mapfilter.positioning.bayes.beliefs.belief_changes import (
+    carried_on,
+    counted_from,
+    remounted,
+    turned_at_jump,
+)
+from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.beliefs.path import DeadReckoning, RecentPath
+from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, MapBelief
+from mapfilter.positioning.bayes.rivals.held import (
+    HeldOtherwise,
+    as_measured,
+    forked,
+    jumps,
+    still_open,
+)
+from mapfilter.positioning.bayes.rivals.mirrored import MirroredTwin, mirrored_step
+from mapfilter.positioning.bayes.rivals.own_draws import OwnDraws
+from mapfilter.positioning.bayes.rivals.unaided import without_positions
+from mapfilter.positioning.bayes.state import BayesState
+from mapfilter.positioning.epochs import Epoch, headed
+from mapfilter.positioning.sensors.rest import Rest
+from mapfilter.positioning.sensors.watch import SensorWatch
+from mapfilter.positioning.step_output import UnusedReading
+
+
+def moved(
+    beliefs: BeliefFilters,
+    state: BayesState,
+    watch: SensorWatch,
+    epoch: Epoch,
+    rng: np.random.Generator,
+) -> tuple[BayesState, list[UnusedReading]]:
+    """Move the beliefs by an epoch's dead reckoning.
+
+    Parameters
+    ----------
+    beliefs : BeliefFilters
+        Filters of single beliefs.
+    state : BayesState
+        After the epoch before.
+    watch : SensorWatch
+        After this epoch's readings.
+    epoch : Epoch
+        With a step to all sides for motion that was not measured.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    state : BayesState
+    unused : list of UnusedReading
+        Motion that was not used.
+    """
+    rested = state.watch.rest if watch.rest is None else None
+    if beliefs.may_be_anywhere(state, watch, epoch.time_s):
+        state = state.begun_anew()
+    move = _Move.of(beliefs, state, epoch, rng)
+    move.begin_rivals()
+    if rested is not None:
+        move.carry_on(rested)
+    for row in epoch.motion:
+        move.by_row(row)
+    return move.after(watch), move.unused
+
+
+@dataclass(slots=True)
+class _Move:
+    """What the motion of an epoch changes, row by row; ``state`` is that before the motion."""
+
+    beliefs: BeliefFilters
+    state: BayesState
+    epoch: Epoch
+    rng: np.random.Generator
+    own: OwnDraws
+    ranged: bool
+    positioned: bool
+    by_course: bool
+    belief: MapBelief | None
+    alternative: AlternativeHypothesis | None
+    twin: MirroredTwin | None
+    held: tuple[HeldOtherwise, ...]
+    unaided: tuple[HeldOtherwise, ...]
+    reckoning: DeadReckoning
+    path: RecentPath
+    heading_rad: float
+    walking_rad: float
+    compass: bool
+    unused: list[UnusedReading]
+
+    @classmethod
+    def of(
+        cls, beliefs: BeliefFilters, state: BayesState, epoch: Epoch, rng: np.random.Generator
+    ) -> _Move:
+        """Return the motion of an epoch before its first row."""
+        ranged = any(isfinite(one.range_m) for one in epoch.ranges)
+        stood_s = epoch.time_s - state.watch.pace.stepped_s
+        return cls(
+            beliefs=beliefs,
+            state=state,
+            epoch=epoch,
+            rng=rng,
+            own=OwnDraws(epoch.time_s),
+            ranged=ranged,
+            positioned=epoch.fix is not None or ranged,
+            # Courses along ways count from a heading of 0, those of a compass from its headings.
+            by_course=beliefs.followed_ways(state),
+            belief=state.belief,
+            alternative=state.alternative,
+            twin=state.twin,
+            held=state.held,
+            unaided=state.unaided,
+            reckoning=state.reckoning,
+            path=state.path,
+            heading_rad=state.heading_rad,
+            # Who stood may have turned there.
+            walking_rad=state.walking_rad if stood_s <= beliefs.holds.longest_pause_s else nan,
+            compass=state.compass,
+            unused=[],
+        )
+
+    def begin_rivals(self) -> None:
+        """Begin beliefs beside the main one that this epoch's positions call for."""
+        belief, hold, gone_m = self.belief, self.state.hold, self.reckoning.travelled_m
+        if self.ranged:
+            # Pseudoranges are compared with the main belief alone, so there is no doubt of a jump.
+            as_is = (one for one in self.held if one.hold.is_as_measured)
+            self.held = () if hold.is_as_measured else tuple(as_is)
+        if not self.positioned or not isinstance(belief, ParticleBelief):
+            return
+        beliefs, null = self.beliefs, self.state.null
+        # Positions tell whether headings are still read rightly.
+        plain = hold.is_as_measured or any(one.hold.is_as_measured for one in self.held)
+        if not plain and self.state.status is belief.status is Status.TRACKING:
+            white_rad, own = beliefs.model.motion.white_rad, self.own.forking
+            plainly = as_measured(beliefs.holds, belief, null, hold, gone_m, white_rad, own)
+            self.held = (*self.held, plainly)
+        if beliefs.positions_lead(self.state):
+            own = self.own.beginning
+            alone = without_positions(beliefs.pulls, belief, null, hold, gone_m, own)
+            self.unaided = (*self.unaided, alone)
+
+    def carry_on(self, rested: Rest) -> None:
+        """Spread the belief over where one may have been carried during a rest that has ended."""
+        if self.belief is not None and self.beliefs.may_have_left(self.state):
+            gone_s = self.epoch.time_s - rested.since_s
+            self.belief = carried_on(self.belief, rested, gone_s, self.own.carrying)
+
+    def by_row(self, row: MotionStep) -> None:
+        """Move everything by one row of motion."""
+        if self.by_course and self.belief is not None and isfinite(row.heading_rad):
+            self._count_from(self.belief, row.heading_rad)
+        measured, self.heading_rad = headed(row, self.heading_rad)
+        if self.compass and measured.turned_sd_rad > 0:
+            # A compass tells where the phone points afterwards.
+            measured = replace(measured, turned_sd_rad=0.0)
+        step = self.state.hold.read(measured)
+        why = Reason.NOT_STARTED
+        if self.beliefs.map_may_start:
+            known = isfinite(row.heading_rad) == self.compass or not self.path.here.travelled_m
+            self.path = (self.path if known else RecentPath()).moved(step)
+            why = Reason.USED if isfinite(step.step_m) else Reason.NO_STEP
+        if self.belief is not None:
+            why = self._move_beliefs(self.belief, row, measured, step)
+        elif not isfinite(row.spread_m):
+            # An unmeasured way says nothing of the compass.
+            self.compass = isfinite(row.heading_rad)
+        if isfinite(row.heading_rad) and row.step_m > 0:
+            self.walking_rad = row.heading_rad
+        elif isfinite(row.spread_m):
+            self.walking_rad = nan
+        if why is not Reason.USED:
+            self.unused.append(UnusedReading(self.epoch.time_s, "motion", "", why))
+
+    def _count_from(self, belief: MapBelief, heading_rad: float) -> None:
+        """Count what followed the ways from the first heading of a compass."""
+        self.by_course, self.held, self.unaided = False, (), ()
+        self.belief = counted_from(belief, heading_rad)
+        if self.alternative is not None:
+            other = counted_from(self.alternative.belief, heading_rad)
+            self.alternative = replace(self.alternative, belief=other)
+
+    def _move_beliefs(
+        self, belief: MapBelief, row: MotionStep, measured: MotionStep, step: MotionStep
+    ) -> Reason:
+        """Move the main belief by a step as it reads it, and all beside it as they do."""
+        turned = isfinite(row.heading_rad) or isfinite(row.spread_m)
+        if self.compass and not turned and self.reckoning.travelled_m == 0:
+            # Nothing has moved yet, so headings can still be relative to the first one.
+            self.compass, belief = False, self.beliefs.without_compass(belief, self.rng)
+            # What began beside it has headings of a compass.
+            self.unaided = ()
+        predict = self.beliefs.moving_filter(self.state, compass=self.compass).predict
+        if self.compass and not self.ranged and jumps(self.walking_rad, row, self.beliefs.holds):
+            belief = self._at_a_jump(belief, row.heading_rad)
+        if self.held:
+            own = self.own.moving
+            self.held = tuple(_moved_as_read(one, predict, measured, own) for one in self.held)
+        if self.unaided:
+            own = self.own.unaided
+            beside = (_moved_as_read(one, predict, measured, own) for one in self.unaided)
+            self.unaided = tuple(beside)
+        belief, why = predict(belief, _assumed(step, belief), self.rng)
+        motion = self.beliefs.model.motion
+        self.belief = remounted(belief, motion, abs(step.step_m), self.rng)
+        self.reckoning = self.reckoning.moved(step)
+        if self.alternative is not None:
+            other = self.alternative.belief
+            as_read = self.alternative.hold.read(measured)
+            other, _ = predict(other, _assumed(as_read, other), self.rng)
+            self.alternative = replace(self.alternative, belief=other)
+        if self.twin is not None:
+            other = self.twin.belief
+            other, _ = predict(other, _assumed(mirrored_step(step), other), self.rng)
+            self.twin = replace(self.twin, belief=other)
+        return why
+
+    def _at_a_jump(self, belief: MapBelief, heading_rad: float) -> MapBelief:
+        """Begin beliefs in which the phone was turned where a heading jumps; return the main one.
+
+        A search takes them into itself.
+        """
+        if belief.status is Status.SEARCHING:
+            if self.positioned:
+                return belief
+            changed_rad = self.state.hold.sign * (heading_rad - self.walking_rad)
+            return turned_at_jump(belief, self.beliefs.holds, changed_rad, self.own.forking)
+        tracked = self.state.status is Status.TRACKING and belief.status is Status.TRACKING
+        if tracked and isinstance(belief, ParticleBelief):
+            beliefs, null, hold = self.beliefs, self.state.null, self.state.hold
+            rules, white_rad, own = beliefs.holds, beliefs.model.motion.white_rad, self.own.forking
+            gone_m, jump_rad = self.reckoning.travelled_m, (self.walking_rad, heading_rad)
+            more = forked(rules, belief, null, hold, jump_rad, gone_m, white_rad, own)
+            self.held = still_open(rules, (*self.held, *more), belief, gone_m)
+        return belief
+
+    def after(self, watch: SensorWatch) -> BayesState:
+        """Return the state after the motion, with that of the sensors."""
+        return replace(
+            self.state,
+            belief=self.belief,
+            reckoning=self.reckoning,
+            heading_rad=self.heading_rad,
+            compass=self.compass,
+            alternative=self.alternative,
+            path=self.path,
+            watch=watch,
+            twin=self.twin,
+            walking_rad=self.walking_rad,
+            held=self.held,
+            unaided=self.unaided,
+        )
+
+
+def _moved_as_read(
+    one: HeldOtherwise, predict: Callable[..., Any], measured: MotionStep, rng: np.random.Generator
+) -> HeldOtherwise:
+    """Return a belief beside the main one, moved by a step as it reads it."""
+    as_read = one.hold.read(measured)
+    return replace(one, belief=predict(one.belief, _assumed(as_read, one.belief), rng)[0])
+
+
+def _assumed(step: MotionStep, belief: MapBelief) -> MotionStep:
+    """Return a step with the errors that a belief assumes: that of its sampling once it is tracked.
+
+    With it a belief that still searches would be too wide to be in one place for some way.
+    """
+    if step.sampling_sd_m == 0 or belief.status is Status.TRACKING:
+        return step
+    return replace(step, sampling_sd_m=0.0)

@@ -1,0 +1,1 @@
+"""Beliefs beside the main one: what they assume, and when they take over."""

@@ -1,0 +1,1 @@
+"""Sources of evidence: measurements of an epoch as log-likelihoods of hypotheses."""

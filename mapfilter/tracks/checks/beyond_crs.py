@@ -1,0 +1,93 @@
+"""Positions at which the coordinates of a log's CRS mean nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mapfilter._crs_reach import likely_mistake, project_within
+from mapfilter._types import Bools, Floats, Ints
+from mapfilter._words import number_of
+from mapfilter.errors import Faults, InputError
+from mapfilter.geodesy import short_crs, unproject
+from mapfilter.tracks.readers.recorded.recording import Recording
+
+_OF_PLACES = ("positions", "truth", "places", "true_places")
+
+
+def without_beyond(
+    where: str,
+    crs: str,
+    lon_deg: Floats,
+    lat_deg: Floats,
+    beyond: Bools,
+    faults: Faults,
+    row_numbers: Ints | None = None,
+) -> str:
+    """Return the note on positions beyond a CRS that are left out, "" without any.
+
+    All of them are a fault: wrong degrees, or a CRS of another region.
+
+    Parameters
+    ----------
+    where : str
+        File or table.
+    beyond : (N,) array of bool
+        As :func:`mapfilter._crs_reach.project_within` returns it.
+    row_numbers : (N,) array of int, optional
+        Of the rows of a table; without them positions are counted.
+    """
+    if not beyond.any():
+        return ""
+    row, count = int(np.argmax(beyond)), int(beyond.sum())
+    place = f"position {row + 1}" if row_numbers is None else f"row {row_numbers[row]}"
+    found = f"{lat_deg[row]:.6g}, {lon_deg[row]:.6g} ({place})"
+    if count == beyond.size:
+        found += f" and {count - 1} more" if count > 1 else ""
+        expected = f"positions that {short_crs(crs)} covers"
+        faults.add(where, expected, found, likely_mistake(crs, lon_deg[row], lat_deg[row]))
+        return ""
+    some = number_of(count, "position")
+    return f"{where}: {some} left out: {short_crs(crs)} has no such places; first {found}"
+
+
+def within_crs(
+    recordings: Sequence[Recording], crs: str, local: str
+) -> tuple[list[Recording], tuple[str, ...]]:
+    """Return recordings without positions that a CRS does not cover, and notes on them.
+
+    Parameters
+    ----------
+    crs : str
+        Of the log.
+    local : str
+        CRS of metres in a frame of their own; "" where they are in that of the log.
+
+    Raises
+    ------
+    InputError
+        It covers none of the positions of a file.
+    """
+    faults, notes, kept = Faults(), list[str](), list[Recording]()
+    for recording in recordings:
+        tables = dict(recording.tables)
+        for name in _OF_PLACES:
+            if name not in tables:
+                continue
+            rows, source = tables[name], recording.crs or local
+            if "lat_deg" in rows:
+                lon_deg, lat_deg = rows["lon_deg"].to_numpy(), rows["lat_deg"].to_numpy()
+            elif source and source != crs:
+                lon_deg, lat_deg = unproject(source, rows["east_m"], rows["north_m"])
+            else:
+                continue
+            beyond = project_within(crs, lon_deg, lat_deg)[2]
+            note = without_beyond(recording.path.name, crs, lon_deg, lat_deg, beyond, faults)
+            if note:
+                notes.append(note)
+                tables[name] = rows[~beyond].reset_index(drop=True)
+        kept.append(replace(recording, tables=tables))
+    faults.raise_if_any(InputError)
+    return kept, tuple(notes)

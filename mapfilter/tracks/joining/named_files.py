@@ -1,0 +1,65 @@
+"""What a person gives by the names of recordings, and of their local frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import isfinite
+from pathlib import Path
+
+from mapfilter.errors import Faults, listed
+from mapfilter.tracks.readers.texts.zipped import files_in_zip, is_zip
+from mapfilter.tracks.store import files_in
+
+_MOST_S = 1e10
+
+
+def offsets_by_path(
+    offsets_s: Mapping[str, float], paths: Sequence[Path], where: str, faults: Faults
+) -> dict[Path, float]:
+    """Return the offset of each recording, which is named by its path or its name alone.
+
+    Parameters
+    ----------
+    offsets_s : mapping of str to float
+        Seconds to add to the times of a recording.
+    paths : sequence of Path
+        Recordings, and folders or ZIPs of them.
+    where : str
+        The option or argument.
+    """
+    if not offsets_s:
+        return {}
+    found: dict[Path, float] = {}
+    files = [file for path in paths for file in _files_of(path)]
+    for name, seconds in offsets_s.items():
+        named = [path for path in files if str(path) == name or path.name == name]
+        if not named:
+            known = listed([path.name for path in files])
+            faults.add(where, f"the name of one of the recordings ({known})", repr(name))
+        elif not (isfinite(seconds) and abs(seconds) <= _MOST_S):
+            faults.add(f"{where} {name}", f"seconds, at most {_MOST_S:g}", f"{seconds:g}")
+        found.update(dict.fromkeys(named, float(seconds)))
+    return found
+
+
+def check_origin(origin_deg: tuple[float, float], where: str, faults: Faults) -> None:
+    """Note an origin that is no latitude and longitude in degrees.
+
+    Parameters
+    ----------
+    where : str
+        The option or argument.
+    """
+    lat_deg, lon_deg = origin_deg
+    if abs(lat_deg) <= 90 and abs(lon_deg) <= 180:
+        return
+    swapped = abs(lon_deg) <= 90 and abs(lat_deg) <= 180
+    hint = "longitude and latitude swapped" if swapped else ""
+    got = f"{lat_deg:g}, {lon_deg:g}"
+    faults.add(where, "a latitude and a longitude in degrees", got, hint)
+
+
+def _files_of(path: Path) -> list[Path]:
+    if path.is_dir():
+        return files_in(path)
+    return files_in_zip(path) if is_zip(path) else [path]

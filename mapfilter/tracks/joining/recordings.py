@@ -1,0 +1,102 @@
+"""Reading the recordings of one journey, each of which another program has made."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
+from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.open_options import CombineOptions, OpenOptions
+from mapfilter.tracks.readers.clocks.local_times import parse_zone
+from mapfilter.tracks.readers.format import ReadOptions
+from mapfilter.tracks.readers.formats import format_of, read_recording
+from mapfilter.tracks.readers.recorded.recording import Recording
+from mapfilter.tracks.readers.texts.zipped import check_zipped, files_in_zip, is_zip
+from mapfilter.tracks.store import files_in, is_log
+
+
+def read_recordings(
+    paths: Sequence[Path], options: OpenOptions
+) -> tuple[list[Recording], tuple[str, ...]]:
+    """Read recordings, and those in folders and ZIPs; notes name files of these that are none.
+
+    Raises
+    ------
+    InputError
+        With the faults of all files.
+    ConfigError
+        A zone, format or column is unknown.
+    """
+    if options.zone:
+        parse_zone(options.zone)
+    inner, notes = _expanded(paths)
+    truth = [path for path in options.combine.truth if path not in inner]
+    files = [*dict.fromkeys(inner), *dict.fromkeys(truth)]
+    reading = ReadOptions(options.zone, options.columns, shared=len(files) > 1)
+    recordings, faults = [], Faults()
+    for path in files:
+        try:
+            recordings.append(read_recording(path, options.format, reading))
+        except ConfigError:
+            raise
+        except MapfilterError as error:
+            faults.take(error)
+    if reading.shared and not faults.found:
+        _check_named(recordings, options.columns, faults)
+    faults.raise_if_any(InputError)
+    return recordings, notes
+
+
+def _check_named(
+    recordings: Sequence[Recording], columns: Mapping[str, str], faults: Faults
+) -> None:
+    """Note columns that none of several recordings has."""
+    names = ", ".join(one.path.name for one in recordings)
+    named = {name for one in recordings for name in one.named}
+    for name, column in columns.items():
+        if name not in named:
+            expected = f"a column {column} for {name} in a plain CSV among them"
+            faults.add(names, expected, "none", "misspelt; files of other formats need no columns")
+
+
+def with_measured(options: CombineOptions, paths: Sequence[Path]) -> CombineOptions:
+    """Return options by which a recording that is named as truth and as log keeps its motion.
+
+    One that only lies in a folder of logs is the truth alone.
+    """
+    return replace(options, measured=[path for path in options.truth if path in paths])
+
+
+def with_remarks(log: TrackLog, notes: Sequence[str], recordings: Sequence[Recording]) -> TrackLog:
+    """Return a log whose notes begin with others, and with those of its recordings' files."""
+    of_files = (remark for recording in recordings for remark in recording.remarks)
+    return replace(log, notes=tuple(dict.fromkeys((*notes, *of_files, *log.notes))))
+
+
+def _expanded(paths: Sequence[Path]) -> tuple[list[Path], tuple[str, ...]]:
+    """Return files, and of folders and ZIPs the recordings in them; notes name other files."""
+    found: list[Path] = []
+    notes = []
+    for path in paths:
+        is_folder = path.is_dir()
+        if not (is_folder or is_zip(path)):
+            found.append(path)
+            continue
+        if is_folder and is_log(path):
+            got, hint = "a track log", "name it alone; recordings cannot be added to it"
+            raise fail(InputError, str(path), "recordings of other programs", got, hint)
+        inner = files_in(path) if is_folder else files_in_zip(path)
+        known = [p for p in inner if format_of(p) is not None]
+        if not is_folder:
+            for other in (p for p in inner if p not in known):
+                check_zipped(other, path)
+        if not known:
+            expected = f"recordings in the {'folder' if is_folder else 'ZIP'}"
+            raise fail(InputError, str(path), expected, "none in a known format")
+        others = [p.name for p in inner if p not in known]
+        if others:
+            notes.append(f"{path.name}: {', '.join(others)[:200]} left out, no recordings")
+        found += known
+    return found, tuple(notes)

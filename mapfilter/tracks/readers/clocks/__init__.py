@@ -1,0 +1,1 @@
+"""Times as recordings write them: zones, dates, clocks that are set back."""

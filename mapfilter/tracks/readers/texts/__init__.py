@@ -1,0 +1,1 @@
+"""Files as text: unpacked, decoded, and divided into lines, columns and events."""

@@ -1,0 +1,304 @@
+"""Columns of texts, read as numbers, times and words; what is none is taken for missing."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from math import nan
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from mapfilter._types import Bools, Floats, Ints
+from mapfilter._words import number_of
+from mapfilter.tracks.readers.clocks.local_parts import note_changes
+from mapfilter.tracks.readers.clocks.local_times import is_beside_change
+from mapfilter.tracks.readers.clocks.plain_times import plain_times
+from mapfilter.tracks.readers.clocks.times import (
+    LEAST_UNIX_S,
+    parse_times,
+    seconds_of_day,
+    unix_seconds,
+)
+from mapfilter.tracks.readers.recorded.reading import Reading
+
+_NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
+_DIGIT = r"\d"
+_WHOLE = r"^(?:[-+]?(\d{1,18}|[0-8]\d{18})|0[xX][0-9a-fA-F]{1,15})$"
+_SHORTENED = re.compile(r"\d{1,9}(?:[.,]\d{1,17})?[eE]\+?\d{1,3}")
+MISSING = ("", "-", "nan", "NaN", "NA", "N/A", "null", "NULL", "None", "none", "#N/A")
+"""Texts of missing values."""
+
+
+@dataclass(eq=False)
+class Columns:
+    """Lines of separated values.
+
+    Parameters
+    ----------
+    reading : Reading
+        Takes notes.
+    names : tuple of str
+        Lower case, without blanks around.
+    line : (N,) array of int
+        The file's line of each row.
+    decimal_comma : bool
+        Whether numbers may have a comma for the point.
+    """
+
+    reading: Reading
+    names: tuple[str, ...]
+    line: Ints
+    decimal_comma: bool = False
+    _columns: dict[int, pa.ChunkedArray | Callable[[], pa.ChunkedArray]] = field(
+        default_factory=dict, repr=False
+    )
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+    def has(self, *names: str) -> bool:
+        """Return whether all these columns are there."""
+        return all(name in self.names for name in names)
+
+    def find(self, *names: str) -> str | None:
+        """Return the first of these names that is a column."""
+        return next((name for name in names if name in self.names), None)
+
+    def _raw(self, *names: str) -> pa.ChunkedArray | None:
+        name = self.find(*names)
+        column = None if name is None else self._columns.get(self.names.index(name))
+        return column() if callable(column) else column
+
+    def texts(self, *names: str) -> np.ndarray:
+        """Return the first of these columns that is there as texts, "" where missing."""
+        column = self._raw(*names)
+        if column is None:
+            return np.full(len(self), "", dtype=object)
+        trimmed = pc.utf8_trim_whitespace(column).dictionary_encode().combine_chunks()
+        words = np.array(trimmed.dictionary.to_pylist(), dtype=object)
+        index = trimmed.indices.to_numpy(zero_copy_only=False)
+        return words[index] if len(words) else np.full(len(self), "", dtype=object)
+
+    def mapped(self, meaning: Callable[[str], Any], *names: str) -> np.ndarray:
+        """Return what each word of a column means; a function of words that are few."""
+        column = self._raw(*names)
+        if column is None:
+            return np.full(len(self), meaning(""), dtype=object)
+        trimmed = pc.utf8_trim_whitespace(column).dictionary_encode().combine_chunks()
+        words = [meaning(word) for word in trimmed.dictionary.to_pylist()]
+        index = trimmed.indices.to_numpy(zero_copy_only=False)
+        found = np.empty(len(words), dtype=object)
+        found[:] = words
+        return found[index] if len(words) else np.full(len(self), meaning(""), dtype=object)
+
+    def flags(self, *names: str, true: Collection[str]) -> Bools:
+        """Return in which rows a column has one of some words."""
+        column = self._raw(*names)
+        if column is None:
+            return np.zeros(len(self), dtype=bool)
+        found = pc.is_in(pc.utf8_trim_whitespace(column), pa.array(list(true)))
+        return np.asarray(found.to_numpy(), dtype=bool)
+
+    def times(
+        self, *names: str, zone: str = "", layout: str = "ISO8601", after_s: float = nan
+    ) -> tuple[Floats, bool]:
+        """Return UTC seconds of a column of times, see :func:`parse_times`; note odd local ones."""
+        time_s, zoned = self._times(names, zone, layout, after_s)
+        if zone and is_beside_change(time_s, zone):
+            one_s, other_s = (self._times(names, z, layout, nan)[0] for z in ("+00:00", "+01:00"))
+            local_s = np.where(one_s == other_s, np.nan, one_s)
+            note_changes(self.reading, local_s, time_s, zone, after_s)
+        return time_s, zoned
+
+    def _times(
+        self, names: Sequence[str], zone: str, layout: str, after_s: float
+    ) -> tuple[Floats, bool]:
+        rows = self
+        if self.decimal_comma and layout == "ISO8601":
+            rows = self.rewritten(r"^(\s*\d+),(\d+\s*)$", r"\1.\2", *names)
+        column = rows._raw(*names)
+        if column is not None and layout == "ISO8601":
+            try:
+                number = np.asarray(pc.cast(column, pa.float64()).to_numpy(), dtype=np.float64)
+            except pa.ArrowInvalid:
+                pass
+            else:
+                return unix_seconds(np.where(np.abs(number) > LEAST_UNIX_S, number, np.nan)), True
+        if column is not None and (found := plain_times(column, zone, layout, after_s)) is not None:
+            return found
+        return parse_times(rows.texts(*names), zone, layout, after_s)
+
+    def times_of_part(
+        self, *names: str, zone: str = "", layout: str = "ISO8601"
+    ) -> tuple[Floats, bool]:
+        """Return what :meth:`times` does of a part of a file, after the parts before it."""
+        time_s, zoned = self.times(*names, zone=zone, layout=layout, after_s=self.reading.passed_s)
+        self.reading.passed_s = max([self.reading.passed_s, *time_s[np.isfinite(time_s)][-1:]])
+        return time_s, zoned
+
+    def contains(self, part: str, *names: str) -> Bools:
+        """Return in which rows a column contains a text."""
+        column = self._raw(*names)
+        if column is None:
+            return np.zeros(len(self), dtype=bool)
+        return np.asarray(pc.match_substring(column, part).to_numpy(), dtype=bool)
+
+    def changes(self, *names: str) -> Bools:
+        """Return in which rows a column differs from the row before; the first one does not."""
+        changed = np.zeros(len(self), dtype=bool)
+        column = self._raw(*names)
+        if column is not None and len(self) > 1:
+            trimmed = pc.utf8_trim_whitespace(column)
+            changed[1:] = pc.not_equal(trimmed.slice(1), trimmed.slice(0, len(self) - 1)).to_numpy()
+        return changed
+
+    def seconds_of_day(self, *names: str) -> Floats:
+        """Return times of day of a column, NaN where it has none; see :func:`seconds_of_day`."""
+        column = self._raw(*names)
+        if column is None:
+            return np.full(len(self), np.nan)
+        return seconds_of_day(column.combine_chunks())
+
+    def rewritten(self, pattern: str, by: str, *names: str) -> Columns:
+        """Return columns in which the texts of one that match a pattern are rewritten."""
+        name = self.find(*names)
+        column = self._raw(*names)
+        if name is None or column is None:
+            return self
+        changed = pc.replace_substring_regex(column, pattern, by)
+        return replace(self, _columns={**self._columns, self.names.index(name): changed})
+
+    def picked(self, columns: Mapping[str, tuple[str, Ints, Ints]], line: Ints) -> Columns:
+        """Return columns of other rows: by name a column of these, rows of it, and their places.
+
+        ``line`` is the file's line of each new row. A column is made when it is read: most of many
+        never are, and all at once need not fit into memory.
+        """
+        made = [partial(self._picked, len(line), *one) for one in columns.values()]
+        return replace(self, names=tuple(columns), line=line, _columns=dict(enumerate(made)))
+
+    def _picked(self, count: int, name: str, rows: Ints, places: Ints) -> pa.ChunkedArray:
+        column, index = self._raw(name), np.full(count, -1, dtype=np.int64)
+        index[places] = rows
+        if column is None:
+            return pa.chunked_array([pa.repeat("", count)])
+        return pc.fill_null(column.take(pa.array(index, mask=index < 0)), "")
+
+    def with_digits(self, *names: str) -> Bools:
+        """Return in which rows a column has a digit: words stand for missing numbers and times."""
+        column = self._raw(*names)
+        if column is None:
+            return np.zeros(len(self), dtype=bool)
+        return np.asarray(pc.match_substring_regex(column, _DIGIT).to_numpy(), dtype=bool)
+
+    def first_text(self, name: str) -> str:
+        """Return the first text of a column that has a digit; "" where there is none."""
+        column = self._raw(name)
+        if column is None:
+            return ""
+        # A receiver without a fix may leave a column blank for long.
+        at = pc.index(pc.match_substring_regex(column, _DIGIT), value=True).as_py()
+        return "" if at < 0 else str(column[at].as_py()).strip()
+
+    def joined(self, before: str, name: str) -> Columns:
+        """Return columns in which the texts of one follow those of another, after a blank.
+
+        Where that is blank, it stays so.
+        """
+        first, second = self._raw(before), self._raw(name)
+        if first is None or second is None:
+            return self
+        first, second = map(pc.utf8_trim_whitespace, (first, second))
+        both = pc.binary_join_element_wise(first, second, " ")
+        both = pc.if_else(pc.equal(second, ""), "", both)
+        return replace(self, _columns={**self._columns, self.names.index(name): both})
+
+    def number(self, *names: str) -> Floats:
+        """Return the first of these columns that is there as numbers, NaN where missing.
+
+        What is no number is noted and taken for missing.
+        """
+        column = self._raw(*names)
+        if column is None:
+            return np.full(len(self), np.nan)
+        if self.decimal_comma:
+            column = pc.replace_substring(column, ",", ".")
+        numbers = self._cast(column, pa.float64(), _NUMBER, names)
+        return np.asarray(numbers.to_numpy(), dtype=np.float64)
+
+    def whole(self, *names: str) -> tuple[Ints, Bools]:
+        """Return whole numbers exactly (0 where missing), and which of them are there.
+
+        Those that begin with 0x are hexadecimal.
+        """
+        column = self._raw(*names)
+        if column is None:
+            return np.zeros(len(self), dtype=np.int64), np.zeros(len(self), dtype=bool)
+        column = pc.replace_substring_regex(pc.utf8_trim_whitespace(column), r"\.0*$", "")
+        numbers = self._cast(column, pa.int64(), _WHOLE, names)
+        there = np.asarray(pc.is_valid(numbers).to_numpy(), dtype=bool)
+        return np.asarray(pc.fill_null(numbers, 0).to_numpy(), dtype=np.int64), there
+
+    def _cast(
+        self, column: pa.ChunkedArray, kind: pa.DataType, pattern: str, names: Sequence[str]
+    ) -> pa.ChunkedArray:
+        name, part = self.find(*names) or "", int(self.line[0]) if len(self) else 0
+        try:
+            numbers = pc.cast(column, kind)
+        except pa.ArrowInvalid:
+            pass
+        else:
+            given = pc.is_valid(numbers)
+            if pa.types.is_floating(kind):
+                given = pc.and_not(given, pc.is_nan(numbers))
+            self.reading.tallies.add_texts(name, part, pc.sum(given).as_py() or 0)
+            return numbers
+        column = pc.utf8_trim_whitespace(column)
+        missing = pc.is_in(column, pa.array(MISSING))
+        good = pc.match_substring_regex(column, pattern)
+        wrong = pc.and_not(pc.invert(good), missing)
+        bad = pc.sum(wrong).as_py()
+        # A word such as "unknown" stands for a missing value.
+        odd = pc.and_(wrong, pc.match_substring_regex(column, _DIGIT))
+        count = pc.sum(odd).as_py() or 0
+        examples = pc.unique(pc.filter(column, odd))[:2].to_pylist()
+        self.reading.tallies.add_texts(name, part, pc.sum(good).as_py() + count, count, examples)
+        if bad:
+            at = pc.index(wrong, value=True).as_py()
+            first = f"first {column[at].as_py()[:40]!r} in line {self.line[at]}"
+            if pa.types.is_integer(kind) and _SHORTENED.fullmatch(column[at].as_py()):
+                first += "; shortened by a spreadsheet: show all digits there, and export again"
+            self.reading.count(
+                lambda n: (
+                    f"{name}: {number_of(n, 'value is no number', 'values are no numbers')}, "
+                    f"taken as missing ({first})"
+                ),
+                bad,
+                key=f"{name}, {kind}",
+                source=part,
+                ignored=True,
+            )
+        column = pc.replace_substring_regex(column, r"^\+", "")
+        return pc.cast(pc.if_else(good, column, None), kind)
+
+
+def only(columns: Mapping[str, Any], lines: Ints, rows: Bools) -> tuple[dict[str, Any], Ints]:
+    """Return some rows of arrays, and their lines; the arrays themselves where all are kept."""
+    if rows.all():
+        return dict(columns), lines
+    kept = {name: v[rows] if np.ndim(v) else v for name, v in columns.items()}
+    return kept, lines[rows]
+
+
+def changed_rows(columns: Mapping[str, Floats], names: Sequence[str]) -> Bools:
+    """Return which rows differ from the row before in one of some columns; the first one does."""
+    changed = np.ones(len(columns[names[0]]), dtype=bool)
+    if len(changed):
+        steps = np.stack([np.diff(np.nan_to_num(columns[name])) for name in names])
+        changed[1:] = (steps != 0).any(axis=0)
+    return changed

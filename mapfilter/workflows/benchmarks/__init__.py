@@ -1,0 +1,1 @@
+"""Parts of ``mapfilter bench``: one module for each stage or comparison."""

@@ -1,0 +1,1 @@
+"""Parts of ``mapfilter check``: logs, places, and suspects by journeys."""

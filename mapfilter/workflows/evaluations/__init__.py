@@ -1,0 +1,1 @@
+"""Parts of ``mapfilter evaluate``: one module for each kind of benchmark."""

@@ -1,0 +1,1 @@
+"""What commands read: areas, plans, streets and logs of a configuration."""

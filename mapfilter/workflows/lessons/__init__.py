@@ -1,0 +1,1 @@
+"""Parts of ``mapfilter learn``: journeys located, what they teach, and its report."""

@@ -1,0 +1,1 @@
+"""Parts of ``mapfilter replay``: its logs, filters, figures and words."""

@@ -1,0 +1,1 @@
+"""Parts of ``mapfilter sweep``: its plan and its tables."""
