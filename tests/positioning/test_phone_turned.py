@@ -15,6 +15,7 @@ from mapfilter.filters.particle import UpdateInfo
 from mapfilter.positioning.bayes.beliefs.new_beliefs import NewBeliefs
 from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.rivals import own_draws
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, NullHypothesis
 from mapfilter.positioning.bayes.rivals.held import (
     HeldOtherwise,
@@ -28,7 +29,6 @@ from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
 from mapfilter.positioning.bayes.rivals.mirrored import MirroredTwin
 from mapfilter.positioning.bayes.rivals.own_draws import own_rng
-from mapfilter.positioning.bayes.rivals.rivals import own_draws
 from mapfilter.positioning.bayes.sources.evidence import RadioReading
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.merging import epochs
