@@ -42,5 +42,18 @@
     const text = ratio > 9999 ? "more than 10\u202f000" : ratio.toFixed(ratio < 10 ? 1 : 0);
     return `${text} times ${nats > 0 ? "more" : "less"} likely than`;
   };
+  // What tells names apart: without the parts, divided by commas, that all of them begin or end with.
+  MF.apart = (names) => {
+    const parts = names.map((one) => one.split(", "));
+    const most = Math.min(...parts.map((one) => one.length)) - 1;
+    const shared = (at) => {
+      let count = 0;
+      while (count < most && parts.every((one) => at(one, count) === at(parts[0], count))) count += 1;
+      return count;
+    };
+    const first = shared((one, k) => one[k]);
+    const last = Math.min(shared((one, k) => one[one.length - 1 - k]), most - first);
+    return parts.map((one) => one.slice(first, one.length - last).join(", "));
+  };
   MF.degrees = (lat, lon) => `${Math.abs(lat).toFixed(5)}° ${lat < 0 ? "S" : "N"}, ${Math.abs(lon).toFixed(5)}° ${lon < 0 ? "W" : "E"}`;
 })();

@@ -92,7 +92,11 @@
     });
     pen.path(points, { stroke: MF.color.halo, width: 8, alpha: 0.9 });
     pen.path(points, { stroke: MF.color.truth, width: 5, alpha: 0.45 });
-    if (points.length) pen.text("start", points[0][0] + 8, points[0][1], { fill: MF.color.ink, halo: MF.color.halo, size: 11 });
+    if (!points.length) return;
+    // The buttons are at the right of the map, where it begins to be read.
+    const [x, y] = points[0];
+    const left = x > view.width - 100;
+    pen.text("start", left ? x - 8 : x + 8, y, { fill: MF.color.ink, align: left ? "right" : "left", halo: MF.color.halo, size: 11 });
   };
 
   MF.drawScaleBar = (pen, right = 12) => {

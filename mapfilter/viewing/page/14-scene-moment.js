@@ -4,8 +4,9 @@
   const known = (place) => Number.isFinite(place.east) && Number.isFinite(place.north);
   const TRAIL = 90;
 
-  const label = (pen, words, x, y, fill) => {
-    const left = x > pen.view.width - 12 - 8 * words.length;
+  // Words beside a mark: at its right, or at its left where the map ends or another mark is.
+  const label = (pen, words, x, y, fill, taken = false) => {
+    const left = taken || x > pen.view.width - 12 - 8 * words.length;
     pen.text(words, left ? x - 15 : x + 11, y, { fill, align: left ? "right" : "left", halo: MF.color.halo, size: 12, weight: 650 });
   };
 
@@ -58,11 +59,15 @@
           pen.circle(x, y, e.r50[i] * camera.scale, { stroke: status, width: 1.2, dash: [5, 3] });
         }
       }
+      let taken = false;
       const runner = { east: e.runner_east?.[i], north: e.runner_north?.[i] };
       if (show.hypotheses && known(runner) && e.runner_mass[i] > 0) {
         const [rx, ry] = at(runner);
         pen.rect(rx - 7, ry - 7, 14, 14, { fill: color.card, stroke: color.there, width: 2.6 });
-        label(pen, MF.share(e.runner_mass[i]), rx, ry, color.there);
+        // Close marks have their words on the sides that look away from each other.
+        const close = Math.abs(rx - x) < 90 && Math.abs(ry - y) < 18;
+        taken = close && rx >= x;
+        label(pen, MF.share(e.runner_mass[i]), rx, ry, color.there, close && !taken);
       }
       const other = { east: e.alt_east?.[i], north: e.alt_north?.[i] };
       if (show.hypotheses && known(other)) {
@@ -72,7 +77,7 @@
       }
       pen.circle(x, y, 8, { fill: status, stroke: color.card, width: 2.5 });
       pen.circle(x, y, 9.5, { stroke: color.ink, width: 1 });
-      if (show.hypotheses) label(pen, MF.share(e.mass?.[i]), x + 2, y, color.ink);
+      if (show.hypotheses) label(pen, MF.share(e.mass?.[i]), x + 2, y, color.ink, taken);
     }
     if (place) MF.drawPlace(pen, place);
   };

@@ -25,10 +25,12 @@
   };
 
   const runField = (page) => {
-    const select = MF.h("select", { id: "second" }, MF.h("option", { value: -1 }, "one map"), page.runs.map((run) => MF.h("option", { value: run.index }, run.name)));
+    const words = MF.apart(page.runs.map((run) => run.name));
+    const options = () => page.runs.map((run, k) => MF.h("option", { value: run.index, title: run.name }, words[k]));
+    const select = MF.h("select", { id: "second" }, MF.h("option", { value: -1 }, "one map"), options());
     select.value = page.store.state.second;
     select.addEventListener("change", () => page.store.set({ second: Number(select.value) }));
-    const first = MF.h("select", { id: "run", "aria-label": "Run" }, page.runs.map((run) => MF.h("option", { value: run.index }, run.name)));
+    const first = MF.h("select", { id: "run", "aria-label": "Run" }, options());
     first.value = page.store.state.run;
     first.addEventListener("change", () => page.store.set({ run: Number(first.value) }));
     page.store.listen((changed, state) => {
