@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from mapfilter.cli.options import JsonOption, given_path
+from mapfilter.workflows.outputs.progress_bars import progress_bar
 from mapfilter.workflows.outputs.terminal import print_result
 
 
@@ -73,4 +74,6 @@ def film(
     """Draw a replay as a film, GIF or MP4."""
     from mapfilter.workflows.film import run_film
 
-    print_result(run_film(result, out.absolute(), run=run, pictures=pictures), as_json)
+    with progress_bar("film") as progress:
+        found = run_film(result, out.absolute(), run=run, pictures=pictures, progress=progress)
+    print_result(found, as_json)

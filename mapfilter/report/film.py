@@ -18,6 +18,7 @@ from matplotlib.patches import Circle
 
 from mapfilter._inputs import open_input, read_input
 from mapfilter._io import atomic_file, check_replaceable
+from mapfilter._parallel import Progress
 from mapfilter._types import Floats
 from mapfilter.errors import OutputError, fail
 from mapfilter.report.basemap import BaseMap, LocalFrame, attribute, draw_base, map_height_in
@@ -117,6 +118,7 @@ def write_film(
     *,
     title: str = "",
     per_second: int = 10,
+    progress: Progress | None = None,
 ) -> Path:
     """Write a film as GIF or, where ffmpeg is found, as MP4, by the suffix.
 
@@ -128,6 +130,8 @@ def write_film(
         The run; each moment shows its way up to then.
     per_second : float
         Pictures a second.
+    progress : callable, optional
+        Called with the numbers of pictures drawn and of all.
 
     Raises
     ------
@@ -157,7 +161,7 @@ def write_film(
     with atomic_file(path) as temporary:
         drawn: list[Artist] = []
         with writer.saving(figure_of(axes), str(temporary), _DPI):
-            for moment in moments:
+            for number, moment in enumerate(moments, start=1):
                 for one in drawn:
                     one.remove()
                 drawn = [
@@ -168,6 +172,8 @@ def write_film(
                 status = track.status[moment.epoch].lower()
                 axes.set_title(f"{title}  {moment.caption}  {status}", fontsize=9)
                 writer.grab_frame()
+                if progress is not None:
+                    progress(number, len(moments))
         _mark_as_film(temporary, kind)
     return path
 

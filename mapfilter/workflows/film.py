@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from mapfilter._parallel import Progress
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.film import FilmMoment, FilmTrack, write_film
@@ -20,7 +21,14 @@ MOST_PICTURES = 240
 _AROUND_M = 80.0
 
 
-def run_film(result: Path, out: Path, *, run: int = 0, pictures: int = 150) -> dict[str, Any]:
+def run_film(
+    result: Path,
+    out: Path,
+    *,
+    run: int = 0,
+    pictures: int = 150,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
     """Write a film of one run of a replay.
 
     Parameters
@@ -33,6 +41,8 @@ def run_film(result: Path, out: Path, *, run: int = 0, pictures: int = 150) -> d
         Of several side by side, counted from 0.
     pictures : int
         How many, evenly chosen in time.
+    progress : callable, optional
+        Called with the numbers of pictures drawn and of all.
 
     Raises
     ------
@@ -54,7 +64,7 @@ def run_film(result: Path, out: Path, *, run: int = 0, pictures: int = 150) -> d
         base = _base(bundle, track)
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise fail(InputError, str(page), "a whole page", repr(error), "damaged") from error
-    write_film(track, moments, base, out, title=str(chosen["name"]))
+    write_film(track, moments, base, out, title=str(chosen["name"]), progress=progress)
     return {"film": out, "pictures": len(moments), "megabytes": round(out.stat().st_size / 1e6, 2)}
 
 

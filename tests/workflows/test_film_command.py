@@ -25,8 +25,12 @@ def page(tmp_path_factory):
 
 
 def test_a_gif_has_its_pictures(page, tmp_path):
-    found = run_film(page, tmp_path / "walk.gif", pictures=4)
+    told = []
+    found = run_film(
+        page, tmp_path / "walk.gif", pictures=4, progress=lambda *counts: told.append(counts)
+    )
     assert found["pictures"] == 4
+    assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
     with Image.open(tmp_path / "walk.gif") as moving:
         assert moving.n_frames == 4
 
