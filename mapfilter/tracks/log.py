@@ -39,6 +39,7 @@ from mapfilter.tracks.checks.log_checks import (
     undirected_note,
 )
 from mapfilter.tracks.checks.misplaced import FAR_APART
+from mapfilter.tracks.checks.missing_levels import WITHOUT_LEVELS, levels_note
 from mapfilter.tracks.checks.motion_faults import compared_places, motion_faults
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.joining.geographic import in_metres
@@ -254,6 +255,8 @@ def make_log(
         every_note += check_steps(tables, called.get("motion", "motion"), faults)
         check_turns(tables["motion"], called.get("motion", "motion"), faults)
         every_note += early_ends(tables)
+        if not any(WITHOUT_LEVELS in note for note in every_note):
+            every_note += levels_note(tables["radio"], called.get("radio", "radio"))
         if not any(TIMES_BEGIN in note for note in every_note):
             every_note += odd_start(start_utc_s, tables, whole)
         if not faults.found and not any(FAR_APART in note for note in every_note):

@@ -186,6 +186,22 @@ def test_a_table_that_ends_early_is_told_once_however_often_it_is_stored(tmp_pat
     assert make_log(CRS, motion=walk(1.4), radio=heard[:130]).notes == ()
 
 
+def test_neighbours_without_any_level_are_noted_once(tmp_path):
+    heard = pd.DataFrame({"time_s": np.repeat(np.arange(6.0), 3), "arfcn": [1, 2, 3] * 6})
+    heard["role"] = ["serving", "neighbour", "neighbour"] * 6
+    heard["level_dbm"] = np.nan
+    log = make_log(CRS, radio=heard)
+    assert len(log.notes) == 1
+    assert log.notes[0].startswith("radio: no row has a level (level_dbm); 12 neighbours tell")
+    write_log(log, tmp_path / "walk")
+    assert read_log(tmp_path / "walk").notes == log.notes
+    heard.loc[17, "level_dbm"] = -80.0
+    assert make_log(CRS, radio=heard).notes == ()
+    assert make_log(CRS, radio=heard.iloc[:12]).notes == ()
+    alone = heard.assign(role="serving", level_dbm=np.nan)
+    assert make_log(CRS, radio=alone).notes == ()
+
+
 @pytest.mark.parametrize("columns", [{}, {"turn_rad": np.append(0.1, np.full(99, np.nan))}])
 def test_steps_without_any_direction_are_noted_once(columns, tmp_path):
     log = make_log(CRS, motion=walk(1.4).drop(columns="heading_rad").assign(**columns))
