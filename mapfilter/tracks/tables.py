@@ -15,6 +15,7 @@ from mapfilter._words import number_of
 from mapfilter.angles import wrap_rad
 from mapfilter.errors import Faults, listed
 from mapfilter.radio.identities import LIMITS, technology
+from mapfilter.radio.scale_ends import at_scale_end
 from mapfilter.tracks.checks.cut_times import cut_times
 from mapfilter.tracks.checks.repeated_readings import repeated_readings
 from mapfilter.tracks.column_values import TableFaults, column_values, note_values
@@ -73,7 +74,7 @@ def tidy_table(
         if "technology" in tidy:
             tidy["technology"] = _technologies(tidy["technology"], found)
             _check_technologies(tidy, found)
-        tidy["censored"] = tidy["censored"].fillna(0)
+        tidy["censored"] = _bounds(tidy, found)
     if table == "gnss":
         _check_covariance(tidy, found)
     if table == "pseudoranges":
@@ -120,6 +121,26 @@ def _technologies(stated: pd.Series, found: TableFaults) -> pd.Series:
         found.notes.append(f"{found.where}, technology: {some} not known, taken for none")
     others = {word: name for word, name in names.items() if name not in (None, word)}
     return stated.replace(others) if others else stated
+
+
+def _bounds(radio: pd.DataFrame, found: TableFaults) -> pd.Series:
+    """Return on which side of the scale levels are, where it is not stated as levels show it."""
+    censored = radio["censored"]
+    level_dbm = radio["level_dbm"].to_numpy(dtype=np.float64, na_value=np.nan)
+    unstated = censored.isna().to_numpy()
+    of = np.zeros(len(radio), dtype=np.int64)
+    if "technology" in radio:
+        of, _ = pd.factorize(radio["technology"])
+    for one in np.unique(of):
+        some = unstated & (of == one)
+        bounds = at_scale_end(np.where(some, level_dbm, np.nan))
+        if not bounds.any():
+            continue
+        censored = censored.mask(bounds, 1)
+        count = number_of(int(bounds.sum()), "level")
+        end = f"{level_dbm[bounds][0]:g} dBm, where a scale ends"
+        found.notes.append(f"{found.where}, level_dbm: {count} of {end}: taken for that or more")
+    return censored.fillna(0)
 
 
 def _check_technologies(radio: pd.DataFrame, found: TableFaults) -> None:
