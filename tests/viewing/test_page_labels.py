@@ -3,8 +3,11 @@
 import re
 
 import made_bundle as made
+import numpy as np
 import pytest
 from page_scripts import ran
+
+from mapfilter.viewing.arrays import packed, places, unpacked
 
 DRAWN = """MF.start(bundle); draw();
 const run = MF.page.active(); const e = run.epochs; const view = { width: 600, height: 400 };
@@ -71,3 +74,22 @@ def test_the_start_is_not_written_beneath_the_buttons(left_m, side):
     const pen = MF.svgPen(camera, view); MF.drawTruth(pen, run); return pen.document("made");"""
     drawn = ran(DRAWN + task, bundle=made.replay_bundle(), left=left_m)
     assert re.findall(r'anchor="(\w+)"[^>]*>start<', drawn) == [side]
+
+
+def test_where_nothing_leads_there_is_nothing_to_compare():
+    """Outside of the area the alternative may have a place, and the estimate none."""
+    bundle = made.replay_bundle() | {"why": None}
+    for run in bundle["runs"]:
+        for name in ("east", "north"):
+            run["epochs"][name] = places(np.full(made.EPOCHS, np.nan))
+        if run["explained"]:
+            count = len(unpacked(run["explained"]["lead_sum"]))
+            run["explained"]["lead_sum"] = packed(np.full(count, np.nan), "f8")
+            run["explained"]["alt_sum"] = packed(np.full(count, -3.0), "f8")
+    task = """MF.start(bundle); draw(); press("n"); draw();
+    const result = MF.compare(MF.page, MF.page.active(), 10, "alt", null);
+    return [result.choices, MF.byId("side").textContent];"""
+    choices, side = ran(task, bundle=bundle)
+    assert choices == []
+    assert "There is no estimate at this moment to compare with." in side
+    assert "NaN" not in side

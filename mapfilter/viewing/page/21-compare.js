@@ -13,8 +13,10 @@
   MF.choices = (page, run, i) => {
     const x = run.explained ? run.reportAt(i) : -1;
     const list = [];
-    if (x >= 0 && Number.isFinite(run.explained.runner_sum.at(x))) list.push("runner");
-    if (x >= 0 && Number.isFinite(run.explained.alt_sum.at(x))) list.push("alt");
+    // Outside of the area nothing leads that another place could be compared with.
+    const led = x >= 0 && Number.isFinite(run.explained.lead_sum.at(x));
+    if (led && Number.isFinite(run.explained.runner_sum.at(x))) list.push("runner");
+    if (led && Number.isFinite(run.explained.alt_sum.at(x))) list.push("alt");
     const own = Boolean(page.ground.levels && page.bundle.why);
     const at = x >= 0 ? run.explained.epoch.raw[x] : i;
     const truth = run.truthAt(at);

@@ -53,6 +53,7 @@
         return `What readings contribute is recorded for the Bayes map filter only. This run is of the filter “${run.data.filter}”`
           + `${alone ? ", which holds one Gaussian and no second place to compare with" : ""}. Replay the log with --filter bayes --html to compare.`;
       }
+      if (!Number.isFinite(run.place(result.epoch).east)) return "There is no estimate at this moment to compare with.";
       return "Nothing to compare with: no second hypothesis is kept. Click on the map to ask why the position is not there.";
     };
     let shown = "";
