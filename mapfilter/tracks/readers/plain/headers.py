@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
+from typing import TypeAlias
 
 from mapfilter._header_units import UNITS, parted_unit, quantity_of
 from mapfilter.tracks.readers.plain.fields import FIELDS, is_of_axis, meant
@@ -111,6 +112,21 @@ _OTHER_MEANING = {**_OTHER_UNIT, "step_m": "steps"}
 _LEAST_LETTERS = 3
 """Of an abbreviation."""
 _WORD = re.compile(r"[^\W\d_]+")
+_Words: TypeAlias = tuple[str, ...]
+
+
+def _by_words(quantities: Mapping[str, tuple[str, ...]]) -> dict[_Words, dict[str, int]]:
+    """Return fields by the sorted words of a quantity, or these as one, and its rank in each."""
+    found: dict[_Words, dict[str, int]] = {}
+    for field, some in quantities.items():
+        for rank, quantity in enumerate(some):
+            own = quantity.split()
+            for words in (tuple(sorted(own)), ("".join(own),)):
+                found.setdefault(words, {}).setdefault(field, rank)
+    return found
+
+
+_BY_WORDS, _ALSO_BY_WORDS = _by_words(QUANTITIES), _by_words(_ALSO_MEANT)
 
 
 def stated_fields(
@@ -159,7 +175,7 @@ def fields_meant(column: str) -> tuple[str, ...]:
         return ()
     some = [
         one
-        for one in _fields_of(text) or _fields_of(text, _ALSO_MEANT) or _abbreviated(text)
+        for one in _fields_of(text) or _fields_of(text, _ALSO_BY_WORDS) or _abbreviated(text)
         if not unit or unit in UNITS.get(quantity_of(one), ())
     ]
     # One of several units is as good as the other where the header states it.
@@ -207,16 +223,9 @@ def _abbreviated(text: str) -> list[str]:
     return list(found) if len(found) == 1 else []
 
 
-def _fields_of(text: str, quantities: Mapping[str, tuple[str, ...]] = QUANTITIES) -> dict[str, int]:
+def _fields_of(text: str, known: Mapping[_Words, dict[str, int]] = _BY_WORDS) -> dict[str, int]:
     """Return the fields whose quantity is written in a text, and by which of its words."""
     every = _WORD.findall(text)
     # A zone is no quantity.
     words = [word for word in every if word != "utc"] or every
-    found = {}
-    for field, some in quantities.items():
-        for rank, quantity in enumerate(some):
-            own = quantity.split()
-            if sorted(words) == sorted(own) or words == ["".join(own)]:
-                found[field] = rank
-                break
-    return found
+    return known.get(tuple(sorted(words)), {})
