@@ -216,6 +216,29 @@ def test_the_nearest_tests_import_a_file_through_the_fewest_others(tmp_path):
     assert nearest("far.py", 1) == "c"
 
 
+def test_tests_that_name_a_file_are_nearer_than_others_that_do_not_import_it(tmp_path):
+    texts = {
+        "toy/__init__.py": "if TYPE_CHECKING:\n    from toy.door import read as read",
+        "toy/wave_files.py": "",
+        "toy/formats.py": "from toy import wave_files",
+        "toy/door.py": "import toy.formats",
+        "tests/test_a.py": "import toy.formats",
+        "tests/test_b.py": "import toy.formats\nimport toy.door\n# Wave files, and WAVE_FILES.",
+        "tests/test_wave_files_c.py": "import mapfilter as mf\nmf.read('waves')",
+        "tests/test_d.py": "from toy.wave_files import x",
+        "tests/test_e.py": "import mapfilter as mf\nmf.write('wave_files')",
+    }
+    for name, text in texts.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    tests = [Path(name) for name in texts if name.startswith("tests")]
+    imports = Imports(tmp_path, "toy")
+    found = imports.nearest(Path("toy", "wave_files.py"), tests, 9)
+    # A name of the front door counts as an import of its file, and a name that has none does not.
+    assert "".join(test.stem[-1] for test in found) == "dbca"
+    assert imports.direct(Path("tests/test_wave_files_c.py")) == {Path("toy/door.py")}
+
+
 def test_kernels_hold_constants_and_compiled_functions():
     def inlined(text):
         return [is_inlined(text, mutant) for mutant in mutants(text, "file.py")]

@@ -1,6 +1,7 @@
 """Tables and elementary functions of the kernels, entry by entry, and the usual options."""
 
 from dataclasses import asdict, replace
+from itertools import product
 from math import atan2, erfc, exp, log, pi, radians, sqrt
 
 import numpy as np
@@ -17,7 +18,7 @@ from mapfilter.models.fingerprint import (
     serving_table,
 )
 from mapfilter.models.level_errors import LevelErrors
-from mapfilter.models.street_ancestors import _squares, draw_ancestors
+from mapfilter.models.street_ancestors import _most_likely, _squares, draw_ancestors
 from mapfilter.models.street_motion import (
     BIAS,
     EAST,
@@ -266,6 +267,18 @@ def test_places_are_sorted_by_their_square():
     # Square 0 holds two, 3 the one on the eastern edge, 4 and 10 those farther south.
     assert start.tolist() == [0, 2, 2, 2, 3, 4, 4, 4, 4, 4, 4, 5, 5]
     assert order.tolist() == [1, 2, 3, 4, 0]
+
+
+def test_no_place_in_a_square_is_likelier_than_its_bound():
+    bounds = _most_likely(4, -0.2).reshape(9, 9)
+    # Two squares are nearest to each other at a corner of both.
+    corners = list(product((0, 1), repeat=2))
+    for (row, col), bound in np.ndenumerate(bounds):
+        apart = [
+            (row - 4 + a - c) ** 2 + (col - 4 + b - d) ** 2
+            for (a, b), (c, d) in product(corners, corners)
+        ]
+        assert bound == pytest.approx(exp(-0.2 * min(apart)))
 
 
 def drawn(later, earlier, log_weight, key=5, log_jump=-6.0):

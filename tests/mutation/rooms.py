@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -57,6 +58,10 @@ def _matching(root: Path, patterns: Iterable[str]) -> list[Path]:
     return sorted(path.relative_to(root) for path in found if path.name != "__init__.py")
 
 
+def _is_front_door(node: ast.AST) -> bool:
+    return isinstance(node, ast.Name) and node.id in ("mf", "mapfilter")
+
+
 def checksum(root: Path, files: Iterable[Path]) -> str:
     """Return a checksum of names and contents of files."""
     whole = hashlib.sha256()
@@ -79,6 +84,8 @@ class Imports:
                 names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
             elif isinstance(node, ast.Import):
                 names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.Attribute) and _is_front_door(node.value):
+                names = [self._front_door.get(node.attr, "")]
             else:
                 continue
             found |= {self._files[name] for name in names if name in self._files}
@@ -91,16 +98,20 @@ class Imports:
     def nearest(self, file: Path, tests: Iterable[Path], count: int) -> list[Path]:
         """Return the files of tests that are nearest to a file, the nearest first.
 
-        Nearest are those that import it themselves, then those that import a file that does, and so
-        on; among equals those that import the fewest files. None reaches it through no import.
+        Nearest are those that import it themselves, then those that name it most often, as a word
+        of their name or text; then those that import a file that does, and so on. Among equals
+        those that import the fewest files. None reaches it through no import.
         """
         steps = self._steps(file)
+        name = re.compile(rf"(?<![a-z]){file.stem.strip('_').replace('_', '[_ ]')}(?![a-z])", re.I)
         ranked = []
         for test in tests:
             imported = self.direct(test)
             if reached := imported & steps.keys():
-                ranked.append((min(steps[f] for f in reached), len(imported), test))
-        return [test for _, _, test in sorted(ranked)[:count]]
+                far = min(steps[f] for f in reached)
+                named = len(name.findall(f"{test.stem} {(self._root / test).read_text()}"))
+                ranked.append((far > 0, -named, far, len(imported), test))
+        return [test for *_, test in sorted(ranked)[:count]]
 
     def _steps(self, file: Path) -> dict[Path, int]:
         """Return the files that import a file, and through how many imports; itself by none."""
@@ -109,6 +120,18 @@ class Imports:
             front = {a for a, b in self._graph.items() if b & front} - steps.keys()
             steps |= dict.fromkeys(front, max(steps.values()) + 1)
         return steps
+
+    @cached_property
+    def _front_door(self) -> dict[str, str]:
+        """Return the modules of the names that the package itself offers."""
+        door = self._root / self._package / "__init__.py"
+        nodes = ast.walk(ast.parse(door.read_bytes() if door.exists() else b""))
+        return {
+            alias.name: node.module
+            for node in nodes
+            if isinstance(node, ast.ImportFrom) and node.module
+            for alias in node.names
+        }
 
     @cached_property
     def _files(self) -> dict[str, Path]:

@@ -125,9 +125,9 @@ def test_a_row_needs_an_identity_a_level_or_a_timing_advance():
 
 def test_marks_of_android_are_no_numbers():
     """Integer.MAX_VALUE and Long.MAX_VALUE are CellInfo.UNAVAILABLE; -1 is of older versions."""
-    values = np.array([-1, 0, 1, 2**31 - 2, 2**31 - 1, 2**31, 2**63 - 1, 5, -2])
-    there = np.array([True] * 7 + [False, True])
-    expected = [NAN, 0, 1, 2**31 - 2, NAN, 2**31, NAN, NAN, -2]
+    values = np.array([-1, 0, 1, 2**31 - 2, 2**31 - 1, 2**31, 2**63 - 2, 2**63 - 1, 5, -2])
+    there = np.array([True] * 8 + [False, True])
+    expected = [NAN, 0, 1, 2**31 - 2, NAN, 2**31, 2**63 - 2, NAN, NAN, -2]
     assert available(values, there).tolist() == pytest.approx(expected, abs=1e-6, nan_ok=True)
 
 

@@ -127,6 +127,20 @@ def test_a_drifting_gyroscope_is_followed(angle_rad, drift_radps):
     assert np.abs(apart).mean() < np.radians(3)
 
 
+def test_the_spread_is_that_of_the_compass_where_it_was_used():
+    second = np.arange(3000) // 10
+    swing_rad = np.radians(6.0) * (-1.0) ** second
+    # 20 s beside something of iron that turns the field and leaves its size.
+    aside_rad = np.where((second >= 150) & (second < 170), np.radians(80.0), 0.0)
+    compass = compass_samples(*samples(0.7 + swing_rad + aside_rad, 300))
+    none = np.full(len(compass.time_s), np.nan)
+    found = yaw_offset(compass, none, none)
+    np.testing.assert_array_equal(np.flatnonzero(found.disturbed), np.arange(150, 170))
+    assert np.degrees(found.spread_rad) == pytest.approx(6.0, abs=0.3)
+    # Any direction, where there was no compass.
+    assert yaw_offset(compass, none, none, use_compass=False).spread_rad == np.pi
+
+
 def test_the_less_compass_the_less_certain():
     time_s, level = samples(0.7, 300)
     sds = []

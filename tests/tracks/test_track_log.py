@@ -179,6 +179,27 @@ def test_degrees_for_metres():
     assert "likely: degrees given for metres" in faults_of(gnss=table)
 
 
+@pytest.mark.parametrize(
+    ("extent", "lasted_s", "east", "is_fault"),
+    [
+        *((0.0, 60.0, 3.0, False), (1e-9, 60.0, 3.0, True)),
+        *((0.499, 60.0, 3.0, True), (0.5, 60.0, 3.0, False)),
+        *((0.01, 10.0, 3.0, True), (0.01, 9.9, 3.0, False)),
+        *((0.01, 60.0, 179.99, True), (0.01, 60.0, 180.0, False)),
+        *((0.01, 60.0, -180.0, True), (0.01, 60.0, -180.01, False)),
+    ],
+)
+@pytest.mark.parametrize("turned", [False, True])
+def test_degrees_lie_within_half_of_one_for_10_s_and_move(extent, lasted_s, east, is_fault, turned):
+    names = ("north_m", "east_m") if turned else ("east_m", "north_m")
+    columns = {names[0]: [east, east + extent], names[1]: [4.0, 4.0]}
+    table = pd.DataFrame({"time_s": [0.0, lasted_s], **columns})
+    if is_fault:
+        assert "likely: degrees given for metres" in faults_of(truth=table)
+    else:
+        assert len(make_log(CRS, truth=table).truth) == 2
+
+
 def test_a_small_local_frame_is_not_taken_for_degrees():
     table = truth(east_m=[0.0, 40.0, 80.0], north_m=[0.0, 1.0, 0.0])
     assert make_log(CRS, truth=table).truth_length_m > 80

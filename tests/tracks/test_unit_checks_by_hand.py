@@ -267,6 +267,16 @@ def test_stated_errors_like_hdop_of_positions_that_lie_apart(off_m, radius_m, is
     assert stated_note(few, true, "the truth") == ""
 
 
+@pytest.mark.parametrize(
+    ("shift_s", "is_noted"), [(-4.0, True), (-3.0, False), (0.0, False), (3.0, False), (4.0, True)]
+)
+def test_clocks_may_differ_by_3_s_before_stated_errors_are_too_small(shift_s, is_noted):
+    time_s = np.arange(60.0)
+    true = pd.DataFrame({"time_s": time_s, "east_m": 5 * time_s, "north_m": 0.0})
+    fixes = true.assign(time_s=time_s + shift_s, var_east_m2=0.3)
+    assert bool(stated_note(fixes, true, "the truth")) == is_noted
+
+
 def satellites(**columns):
     rows = {"time_s": 0.0, "satellite": "G07", "signal": "L1", "pseudorange_m": 2.2e7}
     rows |= {"sigma_m": 5.0, "x_m": 2.6e7, "y_m": 0.0, "z_m": 0.0}
