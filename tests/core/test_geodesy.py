@@ -287,6 +287,12 @@ def test_an_area_across_180_degrees_is_named_as_that(lat):
     check_scale(crs, aside_m, "area.crs")
 
 
+def test_an_area_beyond_a_crs_is_refused_without_a_scale():
+    with pytest.raises(InputError, match="found EPSG:4647, in which it has no place") as refused:
+        check_scale("EPSG:4647", (474_800.0, 5_523_800.0, 478_200.0, 5_527_200.0), "area.crs")
+    assert "nan" not in str(refused.value)
+
+
 PORTO = (-8.63, 41.13, -8.59, 41.16)
 
 
