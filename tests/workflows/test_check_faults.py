@@ -98,6 +98,11 @@ def with_zone(world):
         row["east"] = 35e6 + float(row["east"])
 
 
+def in_unsigned_bytes(world):
+    """Store levels in bytes with a sign, and read them without it."""
+    world.each(lambda v: np.round(np.clip(v, -128, -1)) + 256)
+
+
 def exchange_sites(world):
     """Give the rasters of all sectors of two sites the labels of one another."""
     there = {f"S1{sector}": f"S3{sector}" for sector in "ABC"}
@@ -147,6 +152,7 @@ ERRORS = [
     ("levels-without-sign", lambda w: w.each(np.negative)),
     ("levels-without-sign", lambda w: (setattr(w, "quantity", "loss"), w.each(np.negative))),
     ("rxlev-as-level", lambda w: w.each(quantised)),
+    ("values-implausible", in_unsigned_bytes),
     ("field-strength", lambda w: w.each(lambda v: v + 142.3)),
     ("azimuth-radians", lambda w: w.change("azimuth_deg", lambda a: round(np.radians(a), 4))),
     ("azimuth-gons", lambda w: w.change("azimuth_deg", lambda a: a / 0.9)),
