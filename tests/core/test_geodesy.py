@@ -20,6 +20,7 @@ from mapfilter.geodesy import (
     project,
     projected_crs,
     same_crs,
+    same_grid,
     unproject,
     utm_crs,
 )
@@ -192,6 +193,26 @@ def test_about_the_poles_a_metre_is_one(sign):
 )
 def test_the_same_system_however_it_is_called(spec):
     assert same_crs(projected_crs(spec), "EPSG:32629")
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "same"),
+    [
+        ("EPSG:25832", "EPSG:32632", True),
+        ("EPSG:3067", "EPSG:32635", True),
+        ("EPSG:26918", "EPSG:32618", True),
+        ("EPSG:32632", "EPSG:32632", True),
+        ("EPSG:32632", "EPSG:32732", False),
+        ("EPSG:32632", "EPSG:32633", False),
+        ("EPSG:23032", "EPSG:32632", False),
+        ("EPSG:31467", "EPSG:25832", False),
+        ("EPSG:4647", "EPSG:25832", False),
+        ("EPSG:32632", "+proj=tmerc +lat_0=0 +lon_0=0 +datum=WGS84 +units=m +type=crs", False),
+    ],
+)
+def test_systems_with_the_same_metres_are_one_grid(a, b, same):
+    assert same_grid(a, b) is same
+    assert same_grid(b, a) is same
 
 
 def test_a_system_without_a_number_keeps_its_text():
