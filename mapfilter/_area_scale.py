@@ -28,12 +28,15 @@ def check_scale(crs: str, bounds_m: tuple[float, float, float, float], where: st
     middle_m = np.array([[(west + east) / 2], [(south + north) / 2]])
     ends_m = middle_m + np.array([[0.0, _SHORT_M, -half, half], [0.0, 0.0, 0.0, 0.0]])
     lon_rad, lat_rad = np.radians(unproject(crs, *ends_m))
+    expected = "a CRS whose metres are metres on the ground in this area"
+    if not (np.isfinite(lon_rad).all() and np.isfinite(lat_rad).all()):
+        got = f"{crs}, in which it has no place"
+        raise fail(InputError, where, expected, got, "a CRS of another region, or Web Mercator")
     if np.ptp(lon_rad) > np.pi:
         got = f"{crs}, {west:.0f}..{east:.0f} m east, across it"
         raise fail(InputError, where, ONE_SIDE, got, f"{NO_MAPS}, and cut rasters there")
     along_rad = np.hypot((lon_rad[1] - lon_rad[0]) * np.cos(lat_rad[0]), lat_rad[1] - lat_rad[0])
     ground_m = float(along_rad * _EARTH_RADIUS_M)
     if not abs(ground_m / _SHORT_M - 1) <= _SCALE_TOLERANCE:
-        expected = "a CRS whose metres are metres on the ground in this area"
         got = f"{crs}, of which {_SHORT_M:g} m are {ground_m:.0f} m"
         raise fail(InputError, where, expected, got, "a CRS of another region, or Web Mercator")

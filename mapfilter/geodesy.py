@@ -23,6 +23,7 @@ _SHORT, _MOST_KEPT = 20, 64
 _LEAST_UTM_DEG, _MOST_UTM_DEG = -80.0, 84.0
 _WIDEST_DEG = 90.0
 """Of an area's box across 180° of longitude; a wider one has exchanged corners."""
+_SAME_M = 1.0
 ONE_SIDE = "an area on one side of 180° of longitude"
 NO_MAPS = "no maps are made across it: make an area of each side"
 
@@ -136,6 +137,29 @@ def shown_crs(crs: str) -> str:
 def same_crs(a: str, b: str) -> bool:
     """Return whether two CRS texts mean the same system."""
     return a == b or bool(_horizontal(a).equals(_horizontal(b)))
+
+
+@lru_cache(maxsize=64)
+def same_grid(a: str, b: str) -> bool:
+    """Return whether places have the same east and north in two CRS, to a metre.
+
+    So have those of one projection over WGS 84 and over a datum that is fixed to a continent.
+
+    Examples
+    --------
+    >>> same_grid("EPSG:25832", "EPSG:32632"), same_grid("EPSG:25832", "EPSG:32633")
+    (True, False)
+    """
+    if same_crs(a, b):
+        return True
+    area = _horizontal(a).area_of_use or _horizontal(b).area_of_use
+    if area is None:
+        return False
+    lon_deg = np.linspace(area.west, area.east, 5)[1:-1]
+    lat_deg = np.linspace(area.south, area.north, 5)[1:-1]
+    with np.errstate(invalid="ignore"):  # Infinite are those of places that a CRS lacks.
+        apart_m = np.subtract(project(a, lon_deg, lat_deg), project(b, lon_deg, lat_deg))
+    return bool(np.all(np.abs(apart_m) <= _SAME_M))
 
 
 def utm_zone(lon_deg: float, lat_deg: float) -> int:

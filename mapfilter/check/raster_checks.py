@@ -15,7 +15,12 @@ from mapfilter.check.raster_kinds import Kind, below_free_space_db, falls_away, 
 from mapfilter.check.samples import RasterSample, sample_raster
 from mapfilter.errors import Fault, InputError, listed
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.files import as_stored, check_plausible
+from mapfilter.rasters.files import (
+    SIGN_NOT_READ,
+    are_bytes_without_sign,
+    as_stored,
+    check_plausible,
+)
 from mapfilter.rasters.raster_set import RxLevRasters, in_other_case
 
 _TOO_SMALL_DB = 10.0
@@ -173,7 +178,8 @@ def _check_kind(
     code = "field-strength" if falls else f"{kind}-as-{rasters.quantity}"
     code = "levels-without-sign" if unsigned else code
     # A negative factor turns levels into what looks like losses, and losses into levels.
-    if kind == "unclear" or (rasters.factor < 0 and kind in ("level", "loss")):
+    no_sign = falls and all(are_bytes_without_sign(s.known, rasters.factor) for s in samples)
+    if kind == "unclear" or no_sign or (rasters.factor < 0 and kind in ("level", "loss")):
         code = "values-implausible"
     numbers = np.concatenate([sample.known for sample in samples])
     low, middle, high = np.percentile(numbers, [1, 50, 99])
@@ -183,7 +189,8 @@ def _check_kind(
     )
     if unsigned:
         evidence += f": as losses {below_db:.0f} dB less than those of free space"
-    evidence += ", which become less away from the sites." if falls else "."
+    evidence += ", which become less away from the sites" if falls else ""
+    evidence += f" ({SIGN_NOT_READ})." if no_sign else "."
     ids = listed([sample.cell_id for sample in samples])
     findings.add(code, f"{rasters.path}, cells {ids}", evidence)
     return falls

@@ -17,7 +17,7 @@ from mapfilter.radio.arrange_cells import Arranged
 from mapfilter.radio.cell_layouts import OFFSETS
 from mapfilter.radio.cell_rows import Row
 
-_NEAR_DEG = 3.0
+_NEAR_DEG, _ZONE_M, _WIDEST_ZONE_FT = 3.0, 1e6, 2.8e6
 
 
 def place_rows(path: Path, rows: list[Row], crs: str, faults: Faults) -> None:
@@ -64,14 +64,21 @@ def _metre_fault(east: float, north: float, crs: str) -> tuple[str, str, str] | 
     expected, got = f"metres where {crs} is used", f"{east:g}, {north:g}"
     if max(abs(east), abs(north)) <= 180 and (_near(crs, east, north) or _near(crs, north, east)):
         return expected, got, "degrees given for metres"
-    lon_deg, lat_deg = unproject(crs, east, north)
-    if _near(crs, float(lon_deg), float(lat_deg)):
+    if _near(crs, *_degrees(crs, east, north)):
         return None
-    places = ((north, east), (FOOT_M * east, FOOT_M * north))
-    swapped, in_feet = (_near(crs, *map(float, unproject(crs, *place))) for place in places)
-    if in_feet and not swapped:
-        return expected, got, "feet given for metres"
-    return expected, got, "east and north swapped, or another CRS"
+    zone_m = east // _ZONE_M * _ZONE_M if east > _WIDEST_ZONE_FT else 0.0
+    likely = {
+        "east and north swapped": (north, east),
+        "eastings with the number of a zone in front, as of EPSG:4647": (east - zone_m, north),
+        "feet given for metres": (FOOT_M * east, FOOT_M * north),
+    }
+    near = (hint for hint, place in likely.items() if _near(crs, *_degrees(crs, *place)))
+    return expected, got, next(near, "another CRS")
+
+
+def _degrees(crs: str, east: float, north: float) -> tuple[float, float]:
+    lon_deg, lat_deg = unproject(crs, east, north)
+    return float(lon_deg), float(lat_deg)
 
 
 def _place_fault(lat: float, lon: float, crs: str) -> tuple[str, str, str] | None:

@@ -24,6 +24,9 @@ _PLAUSIBLE: dict[Quantity, tuple[float, float, str]] = {
     "loss": (0.0, 400.0, "levels given for path losses"),
     "deviation": (0.0, 100.0, "levels or path losses given for deviations"),
 }
+SIGN_NOT_READ = "negative numbers read as unsigned ones: PIXELTYPE SIGNEDINT in the .hdr"
+"""The likely mistake where numbers are levels of which the highest bit is no sign."""
+
 _LEAST_LOSS_DB = 20.0
 _LEAST_NODATA = 250.0
 
@@ -132,6 +135,21 @@ def as_stored(number: float, factor: float) -> str:
     return f"{whole:.10g}" if is_whole else str(np.float32(exact))
 
 
+def are_bytes_without_sign(values: Floats32, factor: float) -> bool:
+    """Return whether numbers are what bytes with a sign, all negative, are if read without it.
+
+    Examples
+    --------
+    >>> are_bytes_without_sign(np.float32([128, 171, np.nan]), 1.0)
+    True
+    >>> are_bytes_without_sign(np.float32([98, 171]), 1.0)
+    False
+    """
+    stored = values[~np.isnan(values)] / factor
+    whole = np.abs(stored - np.round(stored)) < 1e-3
+    return bool(stored.size and stored.min() >= 128 and stored.max() <= 255 and whole.all())
+
+
 def check_plausible(values: Floats32, quantity: Quantity, path: Path, factor: float = 1.0) -> None:
     """Check that numbers, multiplied by a factor, can be levels, losses or deviations.
 
@@ -153,7 +171,9 @@ def check_plausible(values: Floats32, quantity: Quantity, path: Path, factor: fl
         elif np.abs(wrong).max() > 1000:
             hint = "factor left out, or the wrong byte order"
             if quantity == "level" and low + 65536 <= lowest:
-                hint = "negative numbers read as unsigned ones: PIXELTYPE SIGNEDINT in the .hdr"
+                hint = SIGN_NOT_READ
+        elif quantity == "level" and are_bytes_without_sign(values, factor):
+            hint = f"{SIGN_NOT_READ}; or path losses"
         raise fail(InputError, where, f"a {quantity} in {low:g}..{high:g} {unit}", got, hint)
     if quantity == "level" and highest >= 0 and _most(values >= 0, values):
         got = f"{got}, mostly 0 and above"

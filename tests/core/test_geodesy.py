@@ -20,6 +20,7 @@ from mapfilter.geodesy import (
     project,
     projected_crs,
     same_crs,
+    same_grid,
     unproject,
     utm_crs,
 )
@@ -194,6 +195,26 @@ def test_the_same_system_however_it_is_called(spec):
     assert same_crs(projected_crs(spec), "EPSG:32629")
 
 
+@pytest.mark.parametrize(
+    ("a", "b", "same"),
+    [
+        ("EPSG:25832", "EPSG:32632", True),
+        ("EPSG:3067", "EPSG:32635", True),
+        ("EPSG:26918", "EPSG:32618", True),
+        ("EPSG:32632", "EPSG:32632", True),
+        ("EPSG:32632", "EPSG:32732", False),
+        ("EPSG:32632", "EPSG:32633", False),
+        ("EPSG:23032", "EPSG:32632", False),
+        ("EPSG:31467", "EPSG:25832", False),
+        ("EPSG:4647", "EPSG:25832", False),
+        ("EPSG:32632", "+proj=tmerc +lat_0=0 +lon_0=0 +datum=WGS84 +units=m +type=crs", False),
+    ],
+)
+def test_systems_with_the_same_metres_are_one_grid(a, b, same):
+    assert same_grid(a, b) is same
+    assert same_grid(b, a) is same
+
+
 def test_a_system_without_a_number_keeps_its_text():
     local = "+proj=tmerc +lat_0=41.1 +lon_0=-8.6 +datum=WGS84 +units=m +type=crs"
     text = projected_crs(local)
@@ -285,6 +306,12 @@ def test_an_area_across_180_degrees_is_named_as_that(lat):
     assert "across it (likely: no maps are made across it" in str(refused.value)
     aside_m = (bounds_m[0] - 5000, bounds_m[1], bounds_m[2] - 5000, bounds_m[3])
     check_scale(crs, aside_m, "area.crs")
+
+
+def test_an_area_beyond_a_crs_is_refused_without_a_scale():
+    with pytest.raises(InputError, match="found EPSG:4647, in which it has no place") as refused:
+        check_scale("EPSG:4647", (474_800.0, 5_523_800.0, 478_200.0, 5_527_200.0), "area.crs")
+    assert "nan" not in str(refused.value)
 
 
 PORTO = (-8.63, 41.13, -8.59, 41.16)

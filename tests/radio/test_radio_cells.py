@@ -68,6 +68,24 @@ def test_east_and_north_are_taken_as_they_are_or_moved_from_their_own_crs(tmp_pa
 
 
 @pytest.mark.parametrize(
+    ("east", "north", "likely"),
+    [
+        (6672000, 385500, "east and north swapped"),
+        (35385500, 6672000, "eastings with the number of a zone in front, as of EPSG:4647"),
+        (3385500, 6672000, "eastings with the number of a zone in front, as of EPSG:4647"),
+        (1264764, 21889763, "feet given for metres"),
+        (9e6, 9.9e6, "another CRS"),
+    ],
+)
+def test_metres_of_another_kind_are_told_by_what_they_are(
+    tmp_path: Path, east: float, north: float, likely: str
+) -> None:
+    header = "cell,east,north,height_m,eirp_dbm,frequency_mhz\n"
+    complaint = _complaint(tmp_path, header + f"A,{east},{north},30,50,1800\n")
+    assert complaint.endswith(f"(likely: {likely})")
+
+
+@pytest.mark.parametrize(
     ("row", "said"),
     [
         ("A,S,24.94,60.17,30,120,50,1800,600,7", "longitude and latitude swapped"),

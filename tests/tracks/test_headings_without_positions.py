@@ -78,6 +78,16 @@ def test_a_log_in_the_crs_of_the_area_is_turned_by_nothing():
     assert in_frame(log, CRS, (LAT, LON)) is log
 
 
+def test_a_log_in_the_same_metres_by_another_name_is_one_of_the_area():
+    places = pd.DataFrame({"time_s": np.arange(3.0), "east_m": 385_000.0, "north_m": 6_672_000.0})
+    log = make_log("EPSG:3067", truth=places)
+    found = in_frame(log, CRS, (LAT, LON))
+    assert found.crs == CRS
+    pd.testing.assert_frame_equal(found.truth, log.truth)
+    elsewhere = make_log("EPSG:2393", truth=places)
+    assert in_frame(elsewhere, CRS, (LAT, LON)) is elsewhere
+
+
 def test_turned_headings_are_wrapped_and_noted():
     motion = pd.DataFrame({"time_s": np.arange(3.0), "step_m": 1.0})
     log = make_log(LOCAL, motion=motion.assign(heading_rad=[-np.pi, np.nan, 0.5]))

@@ -91,6 +91,18 @@ def swap_metres(world):
         row["east"], row["north"] = row["north"], row["east"]
 
 
+def with_zone(world):
+    """Write the number of the zone before the eastings, as EPSG:4647 has it."""
+    world.in_metres()
+    for row in world.rows:
+        row["east"] = 35e6 + float(row["east"])
+
+
+def in_unsigned_bytes(world):
+    """Store levels in bytes with a sign, and read them without it."""
+    world.each(lambda v: np.round(np.clip(v, -128, -1)) + 256)
+
+
 def exchange_sites(world):
     """Give the rasters of all sectors of two sites the labels of one another."""
     there = {f"S1{sector}": f"S3{sector}" for sector in "ABC"}
@@ -140,6 +152,7 @@ ERRORS = [
     ("levels-without-sign", lambda w: w.each(np.negative)),
     ("levels-without-sign", lambda w: (setattr(w, "quantity", "loss"), w.each(np.negative))),
     ("rxlev-as-level", lambda w: w.each(quantised)),
+    ("values-implausible", in_unsigned_bytes),
     ("field-strength", lambda w: w.each(lambda v: v + 142.3)),
     ("azimuth-radians", lambda w: w.change("azimuth_deg", lambda a: round(np.radians(a), 4))),
     ("azimuth-gons", lambda w: w.change("azimuth_deg", lambda a: a / 0.9)),
@@ -161,6 +174,7 @@ ERRORS = [
     ("duplicate-id", lambda w: put(w, "S1B", cell="S1A")),
     ("crs-mixed", lambda w: setattr(w, "lattice", shifted(0, 0, "EPSG:32634"))),
     ("crs-mixed", lambda w: w.in_metres("EPSG:32634")),
+    ("crs-mixed", with_zone),
     ("lon-lat-swapped", swap_degrees),
     ("lon-lat-swapped", lambda w: w.set("--set=area.bbox=60.17,24.93,60.18,24.96")),
     ("east-north-swapped", swap_metres),

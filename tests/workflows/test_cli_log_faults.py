@@ -8,6 +8,8 @@ import pandas as pd
 import pytest
 from command_line import ONE, assert_done, assert_refused, change, contents, mapfilter, put
 
+from mapfilter.geodesy import project, unproject
+
 
 def assert_log_refused(replay, log, *told):
     before = contents(log.parent)
@@ -111,6 +113,21 @@ def test_another_crs_than_the_database(log, replay):
     told = "my-walk, crs: expected EPSG:32635, the database's, found EPSG:32634"
     assert_refused(replay(log), told, "log of another area or zone")
     assert contents(log.parent) == before
+
+
+def test_a_crs_with_the_metres_of_the_database(log, replay):
+    (log / "log.json").write_text('{"crs": "EPSG:25835"}')
+    assert assert_done(replay(log, "--json")).json["switched"] is True
+
+
+def test_a_log_of_the_area_in_another_crs(log, replay):
+    truth = pd.read_csv(log / "truth.csv")
+    degrees = unproject("EPSG:32635", truth["east_m"], truth["north_m"])
+    truth["east_m"], truth["north_m"] = project("EPSG:2393", *degrees)
+    truth.to_csv(log / "truth.csv", index=False)
+    (log / "log.json").write_text('{"crs": "EPSG:2393"}')
+    told = "my-walk, crs: expected EPSG:32635, the database's, found EPSG:2393"
+    assert_refused(replay(log), told, "a log of this area; convert it again with --crs EPSG:32635")
 
 
 def test_one_bad_log_of_many_stops_all_before_anything_is_written(own_world, replay, tmp_path):

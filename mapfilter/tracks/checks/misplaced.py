@@ -26,6 +26,8 @@ UNDONE = {
 }
 """Columns and signs of the true longitude and latitude, by the mistake."""
 
+OTHERWISE = "log of another area or zone"
+"""The likely mistake where no other one explains positions."""
 _MOST_TRIED = 200
 _TIMES = 10.0
 """Undoing a mistake brings positions so many times nearer, or it explains nothing."""
@@ -48,7 +50,7 @@ def check_near(
     north_m: Floats,
     lattice: Lattice,
     faults: Faults,
-    otherwise: str = "log of another area or zone",
+    otherwise: str = OTHERWISE,
 ) -> None:
     """Note positions of which none lies near a database's area, with the likely mistake.
 

@@ -1,4 +1,4 @@
-"""Logs in a local frame: without positions they fit any database."""
+"""Logs in another CRS than a database: a local frame, another name of its own, another system."""
 
 from __future__ import annotations
 
@@ -8,7 +8,16 @@ import numpy as np
 from pyproj import CRS
 
 from mapfilter.angles import wrap_rad
-from mapfilter.geodesy import grid_convergence_rad, short_crs
+from mapfilter.geodesy import (
+    grid_convergence_rad,
+    project,
+    same_crs,
+    same_grid,
+    short_crs,
+    unproject,
+)
+from mapfilter.lattice import Lattice
+from mapfilter.tracks.checks.misplaced import OTHERWISE, is_near
 from mapfilter.tracks.log import TrackLog
 
 LOCAL_FRAME = "a local frame"
@@ -37,7 +46,8 @@ def is_local_frame(crs: str) -> bool:
 def in_frame(log: TrackLog, crs: str, about_deg: tuple[float, float] | None = None) -> TrackLog:
     """Return a log that names no CRS and holds no positions as one in ``crs``.
 
-    Other logs are returned as they are.
+    So is one whose CRS has the same metres, such as that of WGS 84 for that of ETRS89 in one UTM
+    zone. Other logs are returned as they are.
 
     Parameters
     ----------
@@ -48,6 +58,8 @@ def in_frame(log: TrackLog, crs: str, about_deg: tuple[float, float] | None = No
         Latitude and longitude of the area. North of a local frame is true north, from which
         headings are turned to that of ``crs`` there; None leaves them as they are.
     """
+    if log.crs != crs and same_grid(log.crs, crs):
+        return replace(log, crs=crs)
     if not is_local_frame(log.crs) or not (log.truth.empty and log.gnss.empty):
         return log
     note = f"no positions in the log: taken to be in {short_crs(crs)}"
@@ -58,3 +70,14 @@ def in_frame(log: TrackLog, crs: str, about_deg: tuple[float, float] | None = No
         angle = f"{abs(np.degrees(turned_rad)):.1f} degrees"
         note += f", headings by its grid convergence there, {angle}"
     return replace(log, crs=crs, motion=motion, notes=(*log.notes, note))
+
+
+def elsewhere_by(log: TrackLog, lattice: Lattice) -> str:
+    """Return why a log most likely is not in a database's area: its CRS, else its place."""
+    if same_crs(log.crs, lattice.crs):
+        return OTHERWISE
+    for places in (log.truth, log.gnss):
+        degrees = unproject(log.crs, places["east_m"].to_numpy(), places["north_m"].to_numpy())
+        if is_near(*project(lattice.crs, *degrees), lattice):
+            return f"a log of this area; convert it again with --crs {short_crs(lattice.crs)}"
+    return OTHERWISE

@@ -15,7 +15,12 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.checks.foreign_cells import other_networks
 from mapfilter.tracks.checks.misplaced import AWAY_M
 from mapfilter.tracks.checks.motion_fault import fault_notes
-from mapfilter.tracks.checks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
+from mapfilter.tracks.checks.placeless import (
+    LOCAL_FRAME,
+    LOCAL_FRAME_HINT,
+    elsewhere_by,
+    is_local_frame,
+)
 from mapfilter.tracks.checks.range_units import range_notes
 from mapfilter.tracks.checks.refused_motion import mirrored_notes, refused_faults
 from mapfilter.tracks.checks.rounded_degrees import rounded_notes
@@ -91,7 +96,8 @@ def _check_recordings(opened: OpenedLog, findings: Findings) -> None:
 
 def _is_near(path: Path, log: TrackLog, lattice: Lattice, findings: Findings) -> bool:
     if not same_crs(log.crs, lattice.crs):
-        evidence = f"The log is in {short_crs(log.crs)}, the area in {short_crs(lattice.crs)}."
+        evidence = f"The log is in {short_crs(log.crs)}, the area in {short_crs(lattice.crs)}: "
+        evidence += f"{elsewhere_by(log, lattice)}."
         if is_local_frame(log.crs):
             evidence = f"The log is in {LOCAL_FRAME}: {LOCAL_FRAME_HINT}."
         findings.add("crs-mixed", str(path), evidence)

@@ -27,7 +27,12 @@ from mapfilter.positioning.log_lacks import (
     lack_of_log,
 )
 from mapfilter.tracks.checks.log_checks import ends_early
-from mapfilter.tracks.checks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
+from mapfilter.tracks.checks.placeless import (
+    LOCAL_FRAME,
+    LOCAL_FRAME_HINT,
+    elsewhere_by,
+    is_local_frame,
+)
 from mapfilter.tracks.checks.rounded_degrees import rounded_notes
 from mapfilter.tracks.checks.turn_drift import turn_drift_radps
 from mapfilter.tracks.log import TrackLog
@@ -60,7 +65,7 @@ def check_log(path: Path, log: TrackLog, lattice: Lattice, faults: Faults) -> No
     if not same_crs(log.crs, lattice.crs):
         expected = f"{short_crs(lattice.crs)}, the database's"
         local = is_local_frame(log.crs)
-        hint = LOCAL_FRAME_HINT if local else "log of another area or zone"
+        hint = LOCAL_FRAME_HINT if local else elsewhere_by(log, lattice)
         if not local and short_crs(log.crs) == "unknown":
             hint = f"convert it with --crs {short_crs(lattice.crs)}"
         faults.add(f"{path}, crs", expected, LOCAL_FRAME if local else log.crs, hint)
