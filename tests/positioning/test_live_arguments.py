@@ -37,7 +37,9 @@ def test_random_numbers_come_from_a_generator(positioner, rng):
 
 def test_a_known_start_takes_a_generator(database):
     west, south, east, north = database.lattice.bounds_m
-    with pytest.raises(mf.MapfilterError, match=r"^rng: expected a numpy.random.Generator, found 0"):
+    with pytest.raises(
+        mf.MapfilterError, match=r"^rng: expected a numpy.random.Generator, found 0"
+    ):
         FILTERS["bayes"].over(database).begin_at((west + east) / 2, (south + north) / 2, 10.0, 0)
 
 
@@ -75,5 +77,5 @@ def test_numbers_of_numpy_are_numbers(positioner):
 )
 @pytest.mark.parametrize("name", ["bayes", "ekf"])
 def test_kinds_of_a_journey_are_those_of_logs(database, name, kinds, found):
-    with pytest.raises(mf.MapfilterError, match=f"^kinds: expected a collection of .*, found {found}"):
+    with pytest.raises(mf.MapfilterError, match=f"^kinds: expected a collection .*, found {found}"):
         FILTERS[name].over(database).begin(kinds)
