@@ -10,6 +10,19 @@ import numpy as np
 import pandas as pd
 
 
+class EqualByContent:
+    """Base of what filters return: equal where all contents are, to the last bit; NaN equals NaN.
+
+    Arrays have no truth value, by which dataclasses would compare them.
+    """
+
+    __slots__ = ()
+    __hash__ = None  # type: ignore[assignment]
+
+    def __eq__(self, other: object) -> bool:
+        return same(self, other)
+
+
 def same(a: Any, b: Any) -> bool:
     """Return whether two beliefs, estimates or outputs are equal to the last bit.
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mapfilter._same import EqualByContent
 from mapfilter._types import Bools, Floats, Ints
 
 if TYPE_CHECKING:
@@ -25,8 +26,8 @@ _APART = 6.0
 _COLUMNS = ("time_s", "east_m", "north_m")
 
 
-@dataclass(frozen=True, slots=True)
-class Truth:
+@dataclass(frozen=True, slots=True, eq=False)
+class Truth(EqualByContent):
     """True positions of a journey.
 
     Parameters

@@ -13,6 +13,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
+from mapfilter._same import EqualByContent
 from mapfilter._types import Floats
 
 PriorT = TypeVar("PriorT", contravariant=True)
@@ -120,8 +121,8 @@ class MotionStep:
         return self.spread_m if isfinite(self.spread_m) else abs(self.step_m)
 
 
-@dataclass(frozen=True, slots=True)
-class Estimate:
+@dataclass(frozen=True, slots=True, eq=False)
+class Estimate(EqualByContent):
     """Position of a belief; NaN where the filter gives none.
 
     Parameters

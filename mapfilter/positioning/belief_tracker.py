@@ -22,7 +22,7 @@ from mapfilter.filters.contract import (
     checked_estimate,
     checked_pair,
 )
-from mapfilter.positioning.epoch_checks import check_epoch
+from mapfilter.positioning.epoch_checks import check_epoch, check_generator, check_state_kind
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind
 from mapfilter.positioning.step_output import Fix, StepOutput, UnusedReading
@@ -109,9 +109,12 @@ class BeliefTracker(Filter[TrackState]):
         Raises
         ------
         InputError
-            A value of the epoch is of another type or beyond its range.
+            A value of the epoch is of another type or beyond its range, the state is one of another
+            filter, or ``rng`` is no generator.
         """
         check_epoch(epoch)
+        check_state_kind(state, TrackState)
+        check_generator(rng)
         cell, reason, unused = self._serving(epoch)
         belief, status, count = state.belief, state.status, state.hypotheses
         if belief is None:

@@ -1,20 +1,23 @@
-"""Epochs that a program makes itself: values of the types and ranges that a log's tables have.
+"""What a program gives to a filter itself: epochs, and the state, kinds and generator beside them.
 
-Those of a log were checked when it was read; the test that all is well costs them little.
+Values of epochs have the types and ranges of a log's tables. Those of a log were checked when it
+was read; the test that all is well costs them little.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 from math import inf, isnan
 from typing import Any
+
+import numpy as np
 
 from mapfilter._inputs import shown
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.filters.contract import MotionStep
 from mapfilter.positioning.epochs import Difference, Epoch, GnssFix, Pseudorange, ReportRow
-from mapfilter.tracks.schema import NEIGHBOUR, PLACE, SCHEMA, SERVING, Column
+from mapfilter.tracks.schema import ALL_KINDS, NEIGHBOUR, PLACE, SCHEMA, SERVING, Column
 
 _COLUMNS = {table: {column.name: column for column in columns} for table, columns in SCHEMA.items()}
 _TIME = SCHEMA["motion"][0]
@@ -91,6 +94,47 @@ _KINDS = {
 }
 
 
+def check_generator(rng: np.random.Generator) -> None:
+    """Check that random numbers come from a generator: of a seed each step would draw the same.
+
+    Raises
+    ------
+    InputError
+        They do not.
+    """
+    given: Any = rng
+    if not isinstance(given, np.random.Generator):
+        expected, hint = "a numpy.random.Generator", "numpy.random.default_rng(seed), once for all"
+        raise fail(InputError, "rng", expected, shown(given), hint)
+
+
+def check_state_kind(state: object, kind: type) -> None:
+    """Check that a state is one of the filter that it is given to.
+
+    Raises
+    ------
+    InputError
+        It is one of another filter, or none.
+    """
+    if not isinstance(state, kind):
+        expected = "a state of this filter, of begin or step"
+        raise fail(InputError, "state", expected, f"a {type(state).__name__}")
+
+
+def check_kinds_given(kinds: Collection[str]) -> None:
+    """Check the kinds of measurements that a journey records.
+
+    Raises
+    ------
+    InputError
+        They are no collection of texts, or one of them is no kind.
+    """
+    wrong = [kinds] if isinstance(kinds, str) else [one for one in kinds if one not in ALL_KINDS]
+    if wrong:
+        expected = f"a collection of {', '.join(sorted(ALL_KINDS))}"
+        raise fail(InputError, "kinds", expected, ", ".join(map(shown, wrong)))
+
+
 def check_epoch(epoch: Epoch) -> None:
     """Check the values of an epoch: numbers in their ranges, or NaN where they were not measured.
 
@@ -121,9 +165,16 @@ def _is_well(epoch: Any) -> bool:
     """Return whether all values are as expected; most epochs end here."""
     if not (isinstance(epoch, Epoch) and _is_within(epoch.time_s, _TIME.low, _TIME.high)):
         return False
+    parts = (epoch.motion, epoch.radio, epoch.ranges, epoch.differences)
+    # What can be gone over once only would be empty afterwards.
+    if not all(isinstance(part, tuple | list) for part in parts):
+        return False
     try:
         rows = (*epoch.motion, *epoch.radio, *epoch.ranges, *epoch.differences)
-        return all(map(_row_is_well, rows if epoch.fix is None else (*rows, epoch.fix)))
+        rows = rows if epoch.fix is None else (*rows, epoch.fix)
+        # Arrays of one number compare as numbers do, but have no hash.
+        hash(rows)
+        return all(map(_row_is_well, rows))
     except (TypeError, ValueError, KeyError):
         return False
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mapfilter._same import EqualByContent
 from mapfilter._types import Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError
@@ -45,8 +46,8 @@ class TrackEvidence:
         return f"TrackEvidence({number_of(self.entropy_bits.size, 'epoch')})"
 
 
-@dataclass(frozen=True, repr=False)
-class TrackEstimate:
+@dataclass(frozen=True, eq=False, repr=False)
+class TrackEstimate(EqualByContent):
     """The fixes of one track as arrays over N epochs.
 
     Parameters

@@ -15,6 +15,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
+from mapfilter._same import EqualByContent
 from mapfilter._types import Floats
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.positioning.epochs import Epoch
@@ -26,8 +27,8 @@ from mapfilter.tracks.schema import Kind as Kind
 StateT = TypeVar("StateT")
 
 
-@dataclass(frozen=True, slots=True)
-class Hypotheses:
+@dataclass(frozen=True, slots=True, eq=False)
+class Hypotheses(EqualByContent):
     """Position hypotheses of a belief, in the CRS of the filter.
 
     Parameters

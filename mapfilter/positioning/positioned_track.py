@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from mapfilter._same import EqualByContent
 from mapfilter._types import Floats
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import TrackEstimate
 
 
-@dataclass(frozen=True, slots=True)
-class Snapshot:
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot(EqualByContent):
     """The hypotheses that a filter held at one moment.
 
     Parameters
@@ -37,8 +38,8 @@ class Snapshot:
     status: Status
 
 
-@dataclass(frozen=True, slots=True)
-class PositionedTrack:
+@dataclass(frozen=True, slots=True, eq=False)
+class PositionedTrack(EqualByContent):
     """One log, located.
 
     Parameters

@@ -7,13 +7,14 @@ from math import nan
 
 import numpy as np
 
+from mapfilter._same import EqualByContent
 from mapfilter._types import Floats
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.integrity import DEFAULT_RISK, RadialTail
 
 
-@dataclass(frozen=True, slots=True)
-class Fix:
+@dataclass(frozen=True, slots=True, eq=False)
+class Fix(EqualByContent):
     """Position at one epoch; NaN where the filter does not give a value.
 
     Parameters
@@ -93,8 +94,8 @@ class UnusedReading:
     readings: int = 1
 
 
-@dataclass(frozen=True, slots=True)
-class StepOutput:
+@dataclass(frozen=True, slots=True, eq=False)
+class StepOutput(EqualByContent):
     """Output of one step of a filter.
 
     Parameters

@@ -181,7 +181,7 @@ def surveyed(count=3):
     serving = np.resize([False, True], 2 * count)
     return Readings(
         ("A", "B"), cell, report, np.asarray(report // 6, np.int32),
-        531_000.0 + report, 4_555_900.0 - report, -60.0 - np.arange(2.0 * count),
+        531_000.0 + report, 4_555_900.0 - report, -60.0 - np.arange(2.0 * count) % 100,
         np.where(serving, 3.0 + report, 99.0), serving,
     )  # fmt: skip
 

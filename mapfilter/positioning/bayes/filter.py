@@ -40,7 +40,7 @@ from mapfilter.positioning.bayes.sources.usable import usable_epoch
 from mapfilter.positioning.bayes.state import BayesState, check_state, step_output
 from mapfilter.positioning.bayes.warm_up import run_kernels
 from mapfilter.positioning.bayes.weighing import Weighing
-from mapfilter.positioning.epoch_checks import check_epoch
+from mapfilter.positioning.epoch_checks import check_epoch, check_generator, check_kinds_given
 from mapfilter.positioning.epochs import Epoch, serving_cell
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
@@ -145,7 +145,13 @@ class BayesPositioner(Filter[BayesState]):
         """Return the state before the first epoch.
 
         Without ``motion`` among the kinds one may go anywhere between two epochs.
+
+        Raises
+        ------
+        InputError
+            A kind is none, or a text is given for a collection of them.
         """
+        check_kinds_given(kinds)
         sources = {source.name: source.begin() for source in self.sources}
         watch = SensorWatch(has_motion="motion" in kinds or _POSITIONS.isdisjoint(kinds))
         return BayesState(sources=sources, area=self.area.checksum, watch=watch)
@@ -161,9 +167,10 @@ class BayesPositioner(Filter[BayesState]):
         ------
         InputError
             The start lies farther outside the area than 500 m and than five deviations, as degrees
-            given for metres do, or is no number.
+            given for metres do, or is no number; or ``rng`` is no generator.
         """
         check_start(east_m, north_m, sd_m, self.area.lattice)
+        check_generator(rng)
         belief = self.beliefs.by_compass[True].init(Start(None, True, east_m, north_m, sd_m), rng)
         near = -expm1(-0.5 * (NEAR_M / sd_m) ** 2) if sd_m > 0 else 1.0
         least = max(self.options.split_mass, _LEAST_AT_START)
@@ -180,11 +187,12 @@ class BayesPositioner(Filter[BayesState]):
         Raises
         ------
         InputError
-            A value is of another type or beyond its range, such as a level of None; or the state
-            is one of another area.
+            A value is of another type or beyond its range, such as a level of None; the state is
+            one of another area; or ``rng`` is no generator.
         """
         check_epoch(epoch)
         check_state(state, self.area)
+        check_generator(rng)
         spacing_m, hold = state.particle_spacing_m, state.hold
         state = _tracked(state)
         before, weighing = state.status, self._weighing

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from mapfilter._types import Bools, Floats, Ints, Ints8, Ints32
 from mapfilter._words import number_of
 from mapfilter.positioning.fingerprints.planned import Planned
+from mapfilter.positioning.fingerprints.report_checks import checked_columns
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -199,8 +200,9 @@ def make_reports(
     Parameters
     ----------
     report : (N,) array of int
-        Report of each reading, from 0.
+        Report of each reading, from 0 to ``count - 1``.
     cell : sequence of N str
+        Transmitters; whole numbers are taken as text.
     level_dbm : (N,) array
         NaN where missing.
     count : int
@@ -212,17 +214,40 @@ def make_reports(
         Serving cell of each report, empty where there is none.
     sd_db, censored : (N,) array, optional
 
+    Raises
+    ------
+    InputError
+        With every fault: columns of other lengths, a report that there is not, a reading without a
+        transmitter, levels that are none in dBm (70 for -70, 100 for one that was not received), a
+        CRS that is not projected.
+    ConfigError
+        ``count`` is no whole number >= 0.
+
     Examples
     --------
     >>> made = make_reports("EPSG:32635", [1, 0, 1], ["a", "a", "b"], [-70, -60, -80], count=2)
     >>> made.first.tolist(), made.cell.tolist(), made.level_dbm.tolist()
     ([0, 1, 3], [0, 0, 1], [-60.0, -70.0, -80.0])
     """
-    names = np.asarray(cell, dtype=str)
+    by_report = {
+        "places": places,
+        "time_s": time_s,
+        "block": block,
+        "serving": serving,
+        "timing_advance": timing_advance,
+    }
+    more = {"sd_db": sd_db, "censored": censored}
+    crs, given = checked_columns(
+        crs,
+        count,
+        {"report": report, "cell": cell, "level_dbm": level_dbm}
+        | {name: one for name, one in more.items() if one is not None},
+        {name: one for name, one in by_report.items() if one is not None},
+    )
+    names, which, level = given["cell"], given["report"], given["level_dbm"]
     served = np.asarray(serving if serving is not None else np.full(count, ""), dtype=str)
     cell_ids = np.unique(np.concatenate([names, served[served != ""]]))
     index = np.searchsorted(cell_ids, names).astype(np.int32)
-    which, level = np.asarray(report, np.int64), np.asarray(level_dbm, np.float64)
     error = np.zeros(len(which)) if sd_db is None else np.asarray(sd_db, np.float64)
     bound = np.zeros(len(which), np.int8) if censored is None else np.asarray(censored, np.int8)
     order = np.lexsort((-np.where(np.isnan(level), -np.inf, level), index, which))

@@ -16,7 +16,12 @@ import numpy as np
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.filters.gaussian import METHODS, Method
 from mapfilter.models.state import MOVING
-from mapfilter.positioning.epoch_checks import check_epoch
+from mapfilter.positioning.epoch_checks import (
+    check_epoch,
+    check_generator,
+    check_kinds_given,
+    check_state_kind,
+)
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind
@@ -102,7 +107,8 @@ class KalmanTracker(Filter[KalmanState]):
         return replace(self, sites=SiteModels(self.sites.plan, options, self.sites.antennas))
 
     def begin(self, kinds: Collection[Kind] = ALL_KINDS) -> KalmanState:
-        """Return the state before the first epoch."""
+        """Return the state before the first epoch; InputError for a kind that is none."""
+        check_kinds_given(kinds)
         layout = RECKONED if "motion" in kinds else MOVING
         if self.sites.options.has_lasting_fixes:
             layout = extended_layout(layout)
@@ -114,16 +120,19 @@ class KalmanTracker(Filter[KalmanState]):
         self,
         state: KalmanState,
         epoch: Epoch,
-        rng: np.random.Generator,  # noqa: ARG002
+        rng: np.random.Generator,
     ) -> tuple[KalmanState, StepOutput]:
-        """Take one epoch: first move, then measure.
+        """Take one epoch: first move, then measure; there are no random numbers in it.
 
         Raises
         ------
         InputError
-            A value of the epoch is of another type or beyond its range.
+            A value of the epoch is of another type or beyond its range, the state is one of another
+            filter, or ``rng`` is no generator.
         """
         check_epoch(epoch)
+        check_state_kind(state, KalmanState)
+        check_generator(rng)
         work = KalmanStep(self.sites, self.method, state)
         output = StepOutput(work.take(epoch), unused=tuple(work.unused))
         return work.state, output.protected(work.tail)

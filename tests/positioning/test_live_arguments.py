@@ -1,0 +1,81 @@
+"""What a live application gives to a filter by mistake is refused by its name."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from cross_world import make_database
+
+import mapfilter as mf
+from mapfilter.filters.contract import MotionStep
+from mapfilter.positioning.epochs import ReportRow
+
+FILTERS = {
+    "bayes": mf.BayesFilter(max_particles=600, min_search_particles=300, min_particles=200),
+    "candidate": mf.CandidateFilter(),
+    "ekf": mf.KalmanFilter(),
+}
+STEP = MotionStep(1.4, 0.3)
+EPOCH = mf.Epoch(0.0, (STEP,), (ReportRow("serving", "W", None, None, -70.0, 0),))
+
+
+@pytest.fixture(scope="module")
+def database(tmp_path_factory):
+    return make_database(tmp_path_factory.mktemp("cross"))
+
+
+@pytest.fixture(params=FILTERS)
+def positioner(request, database):
+    return FILTERS[request.param].over(database)
+
+
+@pytest.mark.parametrize("rng", [0, None, np.random.RandomState(0)])
+def test_random_numbers_come_from_a_generator(positioner, rng):
+    with pytest.raises(mf.MapfilterError, match=r"^rng: expected a numpy.random.Generator, found"):
+        positioner.step(positioner.begin(), EPOCH, rng)
+
+
+def test_a_known_start_takes_a_generator(database):
+    west, south, east, north = database.lattice.bounds_m
+    with pytest.raises(
+        mf.MapfilterError, match=r"^rng: expected a numpy.random.Generator, found 0"
+    ):
+        FILTERS["bayes"].over(database).begin_at((west + east) / 2, (south + north) / 2, 10.0, 0)
+
+
+@pytest.mark.parametrize("other", ["bayes", "candidate", "ekf", None])
+def test_a_state_is_one_of_the_filter(positioner, database, other):
+    state = None if other is None else FILTERS[other].over(database).begin()
+    if type(state) is type(positioner.begin()):
+        state = (state,)
+    with pytest.raises(mf.MapfilterError, match=r"^state: expected a state of this .*, found a "):
+        positioner.step(state, EPOCH, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("name", ["motion", "radio", "ranges", "differences"])
+def test_rows_that_can_be_gone_over_once_are_refused(positioner, name):
+    given = replace(EPOCH, **{name: iter(getattr(EPOCH, name))})
+    with pytest.raises(mf.MapfilterError, match=f"^epoch, {name}: expected a tuple of"):
+        positioner.step(positioner.begin(), given, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("field", ["step_m", "heading_rad", "turn_rad"])
+def test_an_array_of_one_number_is_no_number(positioner, field):
+    given = replace(EPOCH, motion=(replace(STEP, **{field: np.array([0.5])}),))
+    with pytest.raises(mf.MapfilterError, match=rf"^epoch, motion\[0\].{field}: expected"):
+        positioner.step(positioner.begin(), given, np.random.default_rng(0))
+
+
+def test_numbers_of_numpy_are_numbers(positioner):
+    given = replace(EPOCH, motion=(replace(STEP, step_m=np.array(1.4)), STEP))
+    _, output = positioner.step(positioner.begin(), given, np.random.default_rng(0))
+    assert output.fix.time_s == 0.0
+
+
+@pytest.mark.parametrize(
+    ("kinds", "found"), [("motion", "'motion'"), (["motion", "moton"], "'moton'"), ([3], "3")]
+)
+@pytest.mark.parametrize("name", ["bayes", "ekf"])
+def test_kinds_of_a_journey_are_those_of_logs(database, name, kinds, found):
+    with pytest.raises(mf.MapfilterError, match=f"^kinds: expected a collection .*, found {found}"):
+        FILTERS[name].over(database).begin(kinds)
