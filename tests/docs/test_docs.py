@@ -8,6 +8,7 @@ import textwrap
 import tomllib
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer
@@ -159,6 +160,58 @@ def test_command_line_page_names_every_command_and_option():
             for option in parameter.opts:
                 if option.startswith("-") and option != "--help":
                     assert option in text, (name, option)
+
+
+def test_command_line_page_says_which_commands_take_an_option():
+    commands = typer.main.get_command(app).commands
+    rows = re.findall(
+        r"   \* - (``-.+)\n     - (.+)\n", page("cli.rst").partition("\nExit codes\n")[0]
+    )
+    told: dict[str, set[str]] = {}
+    for options, takers in rows:
+        for option in re.findall(r"--?[a-z][\w-]*", options):
+            told.setdefault(option, set()).update(set(re.findall(r"\w+", takers)) & set(commands))
+    # These say it in words; options of the command's own row are not in the table.
+    for option in told.keys() - {"--json", "--set", "--memory", "--version"}:
+        having = {n for n, c in commands.items() if any(_has(p, option) for p in c.params)}
+        assert told[option] == having, option
+
+
+def _has(parameter: Any, option: str) -> bool:
+    return option in (*parameter.opts, *parameter.secondary_opts)
+
+
+@pytest.mark.parametrize(
+    "path", [DOCS.parent / "README.md", *map(DOCS.joinpath, PAGES)], ids=lambda path: path.stem
+)
+def test_commands_and_options_of_every_page_exist(path):
+    commands = typer.main.get_command(app).commands
+    text = path.read_text(encoding="utf-8").replace("\\\n", " ")
+    line = (
+        r"^mapfilter (.+)"
+        if path.suffix == ".md"
+        else r"^ *\$ mapfilter (.+)|``mapfilter ([^`]+)``"
+    )
+    for found in re.findall(line, text, re.MULTILINE):
+        name, *words = re.sub(r"[#|;].*", "", "".join(found)).split()
+        if name in ("COMMAND", "--help"):
+            continue
+        for word in (one.rstrip(".,:") for one in words if re.match(r"--?[a-z]", one)):
+            taken = any(_has(p, word.partition("=")[0]) for p in commands[name].params)
+            assert taken or word == "--db", (name, word)
+
+
+def test_the_architecture_page_has_every_package_and_the_import_contract():
+    text = page("explanation/architecture.rst")
+    project = tomllib.loads((DOCS.parent / "pyproject.toml").read_text("utf-8"))
+    (layers,) = [c["layers"] for c in project["tool"]["importlinter"]["contracts"] if "layers" in c]
+    (shown,) = re.findall(r"\n::\n\n((?:   [\w| ]+\n)+)", text)
+    assert [line.strip() for line in shown.splitlines()] == layers
+    table = text.partition("The import contract")[0]
+    root = DOCS.parent / "mapfilter"
+    rooms = {path.stem for path in (*root.glob("*.py"), *root.glob("*/")) if path.suffix == ".py"}
+    rooms |= {path.parent.name for path in root.glob("*/__init__.py")}
+    assert rooms - {"__init__", "__main__"} <= named(table)
 
 
 def test_the_readme_names_the_commands_that_read_a_configuration():
