@@ -20,6 +20,10 @@ from mapfilter.cli import app
 from mapfilter.config.load import load_config
 from mapfilter.config.reference import reference_toml
 from mapfilter.config.sections import Config
+from mapfilter.evaluation.accuracy import Accuracy
+from mapfilter.evaluation.outcome import Outcome
+from mapfilter.evaluation.success import SuccessSummary
+from mapfilter.experiments.benchmarks.results import CaseResult
 from mapfilter.experiments.sweep.table import SCHEMA as SWEEP_SCHEMA
 from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.filters.contract import Reason, Status
@@ -118,6 +122,19 @@ def test_files_name_every_column_of_a_database():
 
 def test_files_name_every_column_of_a_sweep():
     assert set(SWEEP_SCHEMA.names) <= named(page("file-formats.rst"))
+
+
+def test_files_name_every_figure_of_a_replay():
+    listed = named(page("file-formats.rst"))
+    for kind in (Outcome, Accuracy, SuccessSummary):
+        assert {field.name for field in fields(kind)} <= listed
+
+
+def test_pages_name_every_figure_of_a_benchmark():
+    names = "simulated-worlds", "foreign-worlds", "satellites-on-the-map", "protection-levels"
+    listed = set[str]().union(*(named(page(f"explanation/{name}.rst")) for name in names))
+    told = {field.name for field in fields(CaseResult)} - {"name", "filter", "runs"}
+    assert {name for name in told if not name.endswith(("_low", "_high"))} <= listed
 
 
 def test_filter_page_tells_every_option_with_its_default():
