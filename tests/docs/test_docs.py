@@ -8,6 +8,7 @@ import textwrap
 import tomllib
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer
@@ -19,6 +20,10 @@ from mapfilter.cli import app
 from mapfilter.config.load import load_config
 from mapfilter.config.reference import reference_toml
 from mapfilter.config.sections import Config
+from mapfilter.evaluation.accuracy import Accuracy
+from mapfilter.evaluation.outcome import Outcome
+from mapfilter.evaluation.success import SuccessSummary
+from mapfilter.experiments.benchmarks.results import CaseResult
 from mapfilter.experiments.sweep.table import SCHEMA as SWEEP_SCHEMA
 from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.filters.contract import Reason, Status
@@ -119,6 +124,19 @@ def test_files_name_every_column_of_a_sweep():
     assert set(SWEEP_SCHEMA.names) <= named(page("file-formats.rst"))
 
 
+def test_files_name_every_figure_of_a_replay():
+    listed = named(page("file-formats.rst"))
+    for kind in (Outcome, Accuracy, SuccessSummary):
+        assert {field.name for field in fields(kind)} <= listed
+
+
+def test_pages_name_every_figure_of_a_benchmark():
+    names = "simulated-worlds", "foreign-worlds", "satellites-on-the-map", "protection-levels"
+    listed = set[str]().union(*(named(page(f"explanation/{name}.rst")) for name in names))
+    told = {field.name for field in fields(CaseResult)} - {"name", "filter", "runs"}
+    assert {name for name in told if not name.endswith(("_low", "_high"))} <= listed
+
+
 def test_filter_page_tells_every_option_with_its_default():
     text = page("explanation/candidate-filter.rst")
     told = dict(re.findall(r"\* - ``(\w+)``\n     - ``([^`]+)``", text))
@@ -159,6 +177,58 @@ def test_command_line_page_names_every_command_and_option():
             for option in parameter.opts:
                 if option.startswith("-") and option != "--help":
                     assert option in text, (name, option)
+
+
+def test_command_line_page_says_which_commands_take_an_option():
+    commands = typer.main.get_command(app).commands
+    rows = re.findall(
+        r"   \* - (``-.+)\n     - (.+)\n", page("cli.rst").partition("\nExit codes\n")[0]
+    )
+    told: dict[str, set[str]] = {}
+    for options, takers in rows:
+        for option in re.findall(r"--?[a-z][\w-]*", options):
+            told.setdefault(option, set()).update(set(re.findall(r"\w+", takers)) & set(commands))
+    # These say it in words; options of the command's own row are not in the table.
+    for option in told.keys() - {"--json", "--set", "--memory", "--version"}:
+        having = {n for n, c in commands.items() if any(_has(p, option) for p in c.params)}
+        assert told[option] == having, option
+
+
+def _has(parameter: Any, option: str) -> bool:
+    return option in (*parameter.opts, *parameter.secondary_opts)
+
+
+@pytest.mark.parametrize(
+    "path", [DOCS.parent / "README.md", *map(DOCS.joinpath, PAGES)], ids=lambda path: path.stem
+)
+def test_commands_and_options_of_every_page_exist(path):
+    commands = typer.main.get_command(app).commands
+    text = path.read_text(encoding="utf-8").replace("\\\n", " ")
+    line = (
+        r"^mapfilter (.+)"
+        if path.suffix == ".md"
+        else r"^ *\$ mapfilter (.+)|``mapfilter ([^`]+)``"
+    )
+    for found in re.findall(line, text, re.MULTILINE):
+        name, *words = re.sub(r"[#|;].*", "", "".join(found)).split()
+        if name in ("COMMAND", "--help"):
+            continue
+        for word in (one.rstrip(".,:") for one in words if re.match(r"--?[a-z]", one)):
+            taken = any(_has(p, word.partition("=")[0]) for p in commands[name].params)
+            assert taken or word == "--db", (name, word)
+
+
+def test_the_architecture_page_has_every_package_and_the_import_contract():
+    text = page("explanation/architecture.rst")
+    project = tomllib.loads((DOCS.parent / "pyproject.toml").read_text("utf-8"))
+    (layers,) = [c["layers"] for c in project["tool"]["importlinter"]["contracts"] if "layers" in c]
+    (shown,) = re.findall(r"\n::\n\n((?:   [\w| ]+\n)+)", text)
+    assert [line.strip() for line in shown.splitlines()] == layers
+    table = text.partition("The import contract")[0]
+    root = DOCS.parent / "mapfilter"
+    rooms = {path.stem for path in (*root.glob("*.py"), *root.glob("*/")) if path.suffix == ".py"}
+    rooms |= {path.parent.name for path in root.glob("*/__init__.py")}
+    assert rooms - {"__init__", "__main__"} <= named(table)
 
 
 def test_the_readme_names_the_commands_that_read_a_configuration():

@@ -9,6 +9,7 @@ import mapfilter as mf
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import project
 from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.tracks.joining.recordings import read_recordings
 from mapfilter.tracks.open_log import list_journeys, open_log
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.sensors import read_sensors
@@ -61,6 +62,8 @@ def test_a_track_log_is_opened_as_it_is(made, tmp_path):
     assert again.sensors.keys() == read_sensors(tmp_path / "log").keys()
     with pytest.raises(InputError, match="name it alone"):
         open_log([tmp_path / "log", tmp_path / "towers.csv"])
+    with pytest.raises(InputError, match="it is used as it is, and needs no conversion"):
+        read_recordings([tmp_path / "log"], OpenOptions())
 
 
 @pytest.mark.parametrize(

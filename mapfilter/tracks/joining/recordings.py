@@ -85,8 +85,9 @@ def _expanded(paths: Sequence[Path]) -> tuple[list[Path], tuple[str, ...]]:
             found.append(path)
             continue
         if is_folder and is_log(path):
-            got, hint = "a track log", "name it alone; recordings cannot be added to it"
-            raise fail(InputError, str(path), "recordings of other programs", got, hint)
+            hint = "name it alone; recordings cannot be added to it"
+            hint = hint if len(paths) > 1 else "it is used as it is, and needs no conversion"
+            raise fail(InputError, str(path), "recordings of other programs", "a track log", hint)
         inner = files_in(path) if is_folder else files_in_zip(path)
         known = [p for p in inner if format_of(p) is not None]
         if not is_folder:
