@@ -2,7 +2,7 @@
 
 import gc
 import os
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -12,30 +12,13 @@ from typing import Any
 os.environ["OPENBLAS_NUM_THREADS"] = os.environ.get("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
+from _pytest.doctest import DoctestModule
 from fuzz import MUTATIONS
 from hypothesis import settings
 
 # A slow machine is no failure: speed belongs in benchmarks.
 settings.register_profile("mapfilter", deadline=None)
 settings.load_profile("mapfilter")
-
-# Commands, with imports from several rooms: python -m tests.fuzz, python -m tests.faults.
-collect_ignore = [
-    "faults.py",
-    "serve_load.py",
-    "fuzz_command.py",
-    "fuzz_readers.py",
-    "fuzz_stored.py",
-]
-if os.environ.get("NUMBA_ENABLE_CUDASIM") != "1":
-    # Each is run by a test in a process of its own.
-    collect_ignore += [
-        "filters/simulated_copies.py", "models/simulated_models.py",
-        "positioning/simulated_device.py",
-    ]  # fmt: skip
-
-# Several have this name: as modules with doctests they could not be imported beside each other.
-collect_ignore_glob = ["*/conftest.py"]
 
 _NEW_OBJECTS = 5000
 _SHARED = Path(__file__).resolve().parents[2] / "shared"
@@ -50,6 +33,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put modules with long tests first, so that no worker ends with one of them alone."""
     long = {item.path for item in items if item.get_closest_marker("long") is not None}
     items.sort(key=lambda item: item.path not in long)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file() -> Generator[None, list[Any], list[Any]]:
+    """Look for no examples in docstrings of tests, which have none."""
+    return [one for one in (yield) if not isinstance(one, DoctestModule)]
 
 
 @pytest.hookimpl(wrapper=True)
