@@ -43,10 +43,10 @@ def course_over_strides(course: Floats, at: Ints, stepped: Bools) -> tuple[Float
     """
     total = np.concatenate([[0.0], np.cumsum(course)])
     before = np.concatenate([at[:1], at[:-1]])
-    lasted = np.clip(at - before, 1, int(_IDLE_S * RATE_HZ))
+    lasted = np.minimum(at - before, int(_IDLE_S * RATE_HZ))
     middle = at - lasted / 2
-    first = np.clip((middle - lasted).round().astype(np.int64), 0, len(course) - 1)
-    last = np.clip((middle + lasted).round().astype(np.int64) + 1, 1, len(course))
+    first = np.maximum((middle - lasted).round().astype(np.int64), 0)
+    last = np.minimum((middle + lasted).round().astype(np.int64) + 1, len(course))
     mean = (total[last] - total[first]) / (last - first)
     values = np.where(stepped, mean, course[at])
     three = stepped[2:] & stepped[1:-1] & stepped[:-2]
