@@ -55,6 +55,8 @@ _ARROW_SHARE = 0.06
 """Length of a sector's arrow, as a share of the extent's diagonal."""
 
 _LEGEND_IN, _MOST_NAMES = 2.7, 60
+_LETTER_PT, _LINE_PT = 6.0, 12.0
+"""Room that a letter of a name takes, and a line."""
 _DEEP_ROWS, _DEEP_ENOUGH = 400, 0.6
 
 
@@ -141,6 +143,7 @@ def plot_points_per_cell(
         axes.scatter(x, y, s=size, color=groups.colours[index], marker="s", linewidths=0, zorder=3)
         named_at = _nearest_to_median(x, y) if x.size and groups.is_named(index) else None
         groups.add(index, grouped(counts[index]), named_at)
+    groups.write_names()
     finish_map(axes, base, plan, title)
     side_legend(axes, "cell: points", groups.handles, groups.counts, network_legend(plan))
     return axes
@@ -181,6 +184,7 @@ def plot_best_server(
             row, col = _deepest(best_server[window] == index)
             named_at = frame(*lattice.east_north(row + window[0].start, col + window[1].start))
         groups.add(index, f"{100 * count / best_server.size:.1f} %", named_at)
+    groups.write_names()
     finish_map(axes, base, plan, title)
     marks = network_legend(plan)
     without = best_server.size - sum(counts)
@@ -201,6 +205,7 @@ class _Groups:
         self.handles: list[Line2D] = []
         self.counts = [count for count in counts if count]
         self._sizes = counts
+        self._places: dict[int, tuple[float, float]] = {}
         self._axes, self._plan, self._ids = axes, plan, cell_ids
         self._names, self._named = short_names(cell_ids), largest(counts, _MOST_NAMES)
 
@@ -216,9 +221,42 @@ class _Groups:
         if self._sizes[index]:
             self.handles.append(mark(f"{name}: {amount}", "s", 7, color=colour))
         if named_at is not None:
-            x, y = named_at
-            look = Look(fontsize=8, zorder=12, clip_on=True) | MAP_NAME
-            self._axes.text(float(x), float(y), self._names[index], **look)
+            self._places[index] = float(named_at[0]), float(named_at[1])
+
+    def write_names(self) -> None:
+        """Write names at their places, those of large cells first, where none is written yet.
+
+        Near an edge a name begins or ends at its place, so that all of it is on the map.
+        """
+        (left, right), (bottom, top) = self._axes.get_xlim(), self._axes.get_ylim()
+        pt = (right - left) / (72 * MAP_IN)
+        written: list[Bounds] = []
+        for index in sorted(self._places, key=lambda index: -self._sizes[index]):
+            (x, y), name = self._places[index], self._names[index]
+            wide, high = _LETTER_PT * pt * len(name), _LINE_PT * pt
+            begin, ha = _beside(x, wide, left, right, ("left", "center", "right"))
+            below, va = _beside(y, high, bottom, top, ("bottom", "center", "top"))
+            box = begin, below, begin + wide, below + high
+            if any(_overlap(box, other) for other in written):
+                continue
+            written.append(box)
+            look = Look(fontsize=8, zorder=12, clip_on=True) | MAP_NAME | Look(ha=ha, va=va)
+            self._axes.text(x, y, name, **look)
+
+
+def _beside(
+    at: float, length: float, low: float, high: float, sides: tuple[str, str, str]
+) -> tuple[float, str]:
+    """Return where a text begins that has to lie between two ends, and how it is aligned."""
+    if at - length / 2 < low:
+        return at, sides[0]
+    if at + length / 2 > high:
+        return at - length, sides[2]
+    return at - length / 2, sides[1]
+
+
+def _overlap(a: Bounds, b: Bounds) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
 def _deepest(own: NDArray[np.bool_]) -> tuple[Any, Any]:
