@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
+from matplotlib.transforms import offset_copy
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, find_objects
 
@@ -46,6 +47,7 @@ from mapfilter.report.canvas import (
     GREY,
     Look,
     distinct_colours,
+    figure_of,
     grouped,
     mark,
     styled,
@@ -55,7 +57,7 @@ _ARROW_SHARE = 0.06
 """Length of a sector's arrow, as a share of the extent's diagonal."""
 
 _LEGEND_IN, _MOST_NAMES = 2.7, 60
-_LETTER_PT, _LINE_PT = 6.0, 12.0
+_LETTER_PT, _LINE_PT = 5.6, 11.0
 """Room that a letter of a name takes, and a line."""
 _DEEP_ROWS, _DEEP_ENOUGH = 400, 0.6
 
@@ -226,33 +228,25 @@ class _Groups:
     def write_names(self) -> None:
         """Write names at their places, those of large cells first, where none is written yet.
 
-        Near an edge a name begins or ends at its place, so that all of it is on the map.
+        Near an edge a name is shifted by so much that all of it is on the map.
         """
         (left, right), (bottom, top) = self._axes.get_xlim(), self._axes.get_ylim()
         pt = (right - left) / (72 * MAP_IN)
         written: list[Bounds] = []
         for index in sorted(self._places, key=lambda index: -self._sizes[index]):
             (x, y), name = self._places[index], self._names[index]
-            wide, high = _LETTER_PT * pt * len(name), _LINE_PT * pt
-            begin, ha = _beside(x, wide, left, right, ("left", "center", "right"))
-            below, va = _beside(y, high, bottom, top, ("bottom", "center", "top"))
-            box = begin, below, begin + wide, below + high
+            half_x, half_y = _LETTER_PT * pt * len(name) / 2, _LINE_PT * pt / 2
+            at_x = float(np.clip(x, left + half_x, max(right - half_x, left + half_x)))
+            at_y = float(np.clip(y, bottom + half_y, top - half_y))
+            box = at_x - half_x, at_y - half_y, at_x + half_x, at_y + half_y
             if any(_overlap(box, other) for other in written):
                 continue
             written.append(box)
-            look = Look(fontsize=8, zorder=12, clip_on=True) | MAP_NAME | Look(ha=ha, va=va)
+            shift_pt = (at_x - x) / pt, (at_y - y) / pt
+            data, figure = self._axes.transData, figure_of(self._axes)
+            look = Look(fontsize=8, zorder=12, clip_on=True) | MAP_NAME
+            look["transform"] = offset_copy(data, figure, *shift_pt, units="points")
             self._axes.text(x, y, name, **look)
-
-
-def _beside(
-    at: float, length: float, low: float, high: float, sides: tuple[str, str, str]
-) -> tuple[float, str]:
-    """Return where a text begins that has to lie between two ends, and how it is aligned."""
-    if at - length / 2 < low:
-        return at, sides[0]
-    if at + length / 2 > high:
-        return at - length, sides[2]
-    return at - length / 2, sides[1]
 
 
 def _overlap(a: Bounds, b: Bounds) -> bool:
