@@ -216,14 +216,14 @@ def largest(counts: Sequence[int], most: int) -> set[int]:
 
 
 def short_names(names: Sequence[str]) -> list[str]:
-    """Return names without what they all begin with, up to a hyphen, for want of room on a map.
+    """Return names without numbers that they all begin with, up to a hyphen, to fit on a map.
 
     Examples
     --------
     >>> short_names(["302-720-29100-95", "302-720-29100-9"])
     ['95', '9']
-    >>> short_names(["S1A", "S1B"])
-    ['S1A', 'S1B']
+    >>> short_names(["Saint-Denis 1", "Saint-Denis 2"])
+    ['Saint-Denis 1', 'Saint-Denis 2']
     """
     if len(names) < 2:
         return list(names)
@@ -231,6 +231,8 @@ def short_names(names: Sequence[str]) -> list[str]:
     first, last = min(names), max(names)
     differ = (i for i, (a, b) in enumerate(zip(first, last, strict=False)) if a != b)
     cut = first[: next(differ, len(first))].rfind("-") + 1
+    if any(sign.isalpha() for sign in first[:cut]):
+        return list(names)
     return [name[cut:] or name for name in names]
 
 

@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
+from matplotlib.transforms import offset_copy
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, find_objects
 
@@ -46,6 +47,7 @@ from mapfilter.report.canvas import (
     GREY,
     Look,
     distinct_colours,
+    figure_of,
     grouped,
     mark,
     styled,
@@ -55,6 +57,8 @@ _ARROW_SHARE = 0.06
 """Length of a sector's arrow, as a share of the extent's diagonal."""
 
 _LEGEND_IN, _MOST_NAMES = 2.7, 60
+_LETTER_PT, _LINE_PT = 5.6, 11.0
+"""Room that a letter of a name takes, and a line."""
 _DEEP_ROWS, _DEEP_ENOUGH = 400, 0.6
 
 
@@ -141,6 +145,7 @@ def plot_points_per_cell(
         axes.scatter(x, y, s=size, color=groups.colours[index], marker="s", linewidths=0, zorder=3)
         named_at = _nearest_to_median(x, y) if x.size and groups.is_named(index) else None
         groups.add(index, grouped(counts[index]), named_at)
+    groups.write_names()
     finish_map(axes, base, plan, title)
     side_legend(axes, "cell: points", groups.handles, groups.counts, network_legend(plan))
     return axes
@@ -181,6 +186,7 @@ def plot_best_server(
             row, col = _deepest(best_server[window] == index)
             named_at = frame(*lattice.east_north(row + window[0].start, col + window[1].start))
         groups.add(index, f"{100 * count / best_server.size:.1f} %", named_at)
+    groups.write_names()
     finish_map(axes, base, plan, title)
     marks = network_legend(plan)
     without = best_server.size - sum(counts)
@@ -201,6 +207,7 @@ class _Groups:
         self.handles: list[Line2D] = []
         self.counts = [count for count in counts if count]
         self._sizes = counts
+        self._places: dict[int, tuple[float, float]] = {}
         self._axes, self._plan, self._ids = axes, plan, cell_ids
         self._names, self._named = short_names(cell_ids), largest(counts, _MOST_NAMES)
 
@@ -216,9 +223,34 @@ class _Groups:
         if self._sizes[index]:
             self.handles.append(mark(f"{name}: {amount}", "s", 7, color=colour))
         if named_at is not None:
-            x, y = named_at
+            self._places[index] = float(named_at[0]), float(named_at[1])
+
+    def write_names(self) -> None:
+        """Write names at their places, those of large cells first, where none is written yet.
+
+        Near an edge a name is shifted by so much that all of it is on the map.
+        """
+        (left, right), (bottom, top) = self._axes.get_xlim(), self._axes.get_ylim()
+        pt = (right - left) / (72 * MAP_IN)
+        written: list[Bounds] = []
+        for index in sorted(self._places, key=lambda index: -self._sizes[index]):
+            (x, y), name = self._places[index], self._names[index]
+            half_x, half_y = _LETTER_PT * pt * len(name) / 2, _LINE_PT * pt / 2
+            at_x = float(np.clip(x, left + half_x, max(right - half_x, left + half_x)))
+            at_y = float(np.clip(y, bottom + half_y, top - half_y))
+            box = at_x - half_x, at_y - half_y, at_x + half_x, at_y + half_y
+            if any(_overlap(box, other) for other in written):
+                continue
+            written.append(box)
+            shift_pt = (at_x - x) / pt, (at_y - y) / pt
+            data, figure = self._axes.transData, figure_of(self._axes)
             look = Look(fontsize=8, zorder=12, clip_on=True) | MAP_NAME
-            self._axes.text(float(x), float(y), self._names[index], **look)
+            look["transform"] = offset_copy(data, figure, *shift_pt, units="points")
+            self._axes.text(x, y, name, **look)
+
+
+def _overlap(a: Bounds, b: Bounds) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
 def _deepest(own: NDArray[np.bool_]) -> tuple[Any, Any]:

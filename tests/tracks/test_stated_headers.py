@@ -170,6 +170,39 @@ def test_dates_and_times_as_loggers_write_them(tmp_path, date, time):
     assert ("time: columns date and time" in found.notes) == bool(date)
 
 
+def dated(folder, *dates, midnight=False):
+    """Write times of day beside columns of dates under other names; read them."""
+    path, at = folder / "walk.csv", ["23:59:5{}", "00:00:0{}"] if midnight else ["23:26:4{}"]
+    rows = [f"{time.format(k)},60.1,24.{k}" for time in at for k in range(9)]
+    names = "".join(f"{name}," for name, _ in dates)
+    values = "".join(f"{value}," for _, value in dates)
+    text = "\n".join(f"{values}{row}" for row in rows)
+    path.write_text(f"{names}Uhrzeit,lat,lon\n{text}\n")
+    options = ReadOptions(zone="Europe/Helsinki", columns={"time": "Uhrzeit"})
+    return read_recording(path, options=options)
+
+
+@pytest.mark.parametrize(
+    ("name", "date"), [("Datum", "28.05.2026"), ("Fecha", "2026-05-28"), ("Jour", "2026/05/28")]
+)
+def test_a_column_of_dates_is_known_by_its_values(tmp_path, name, date):
+    found = dated(tmp_path, (name, date))
+    np.testing.assert_allclose(found.tables["positions"]["time_s"], 1.78e9 + np.arange(9))
+    assert f"time: columns {name.lower()} and uhrzeit" in found.notes
+    assert not found.unread
+
+
+def test_a_date_of_another_name_that_stays_over_midnight_goes_on(tmp_path):
+    found = dated(tmp_path, ("Datum", "28.05.2026"), midnight=True)
+    assert np.diff(found.tables["positions"]["time_s"]).max() == pytest.approx(2.0)
+    assert any("the date stays the same over midnight" in note for note in found.notes)
+
+
+def test_of_two_columns_of_dates_neither_is_taken(tmp_path):
+    with pytest.raises(InputError, match="a time of day without its date"):
+        dated(tmp_path, ("Datum", "28.05.2026"), ("Stand", "01.05.2026"))
+
+
 def test_counted_steps_are_found_by_words(tmp_path):
     found = read(tmp_path, {"time": TIME_S, "Step count": np.arange(40), "Heading (°)": 90.0})
     assert {"steps", "compass"} <= set(found.tables)

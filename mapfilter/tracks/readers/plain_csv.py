@@ -13,6 +13,7 @@ from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.plain.app_names import full_names, with_full_names
 from mapfilter.tracks.readers.plain.attitude import add_attitude
 from mapfilter.tracks.readers.plain.cells import add_cells
+from mapfilter.tracks.readers.plain.dates import with_dates
 from mapfilter.tracks.readers.plain.fields import FIELDS, usual_fields
 from mapfilter.tracks.readers.plain.headers import stated_fields
 from mapfilter.tracks.readers.plain.mapped import (
@@ -21,7 +22,6 @@ from mapfilter.tracks.readers.plain.mapped import (
     Mapped,
     add_rows,
     mapped_columns,
-    with_dates,
 )
 from mapfilter.tracks.readers.plain.odometry import add_odometry, add_turns
 from mapfilter.tracks.readers.plain.places import add_places, hemisphere_columns

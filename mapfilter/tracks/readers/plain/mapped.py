@@ -18,7 +18,6 @@ from mapfilter.tracks.readers.recorded.identities import available, parse_identi
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.texts.columns import MISSING, Columns, only
 
-DATE = "date"
 _AZIMUTHS = ("azimuth", "compass", "compass_azimuth")
 _DIRECTIONS = (
     *("compass_deg", "heading_rad", "turn_rad", "turn_deg"),
@@ -33,7 +32,6 @@ _DECIMAL = re.compile(r"-?[0-9]{1,20}(\.0*)?|0x[0-9a-f]{1,9}", re.ASCII | re.IGN
 _HEXADECIMAL = re.compile(r"[0-9a-f]{4,9}", re.ASCII | re.IGNORECASE)
 _OF_NODE = re.compile(r"(?:\d|[1-9]\d|1\d\d|2[0-4]\d|25[0-5])(?:\.0*)?", re.ASCII)
 _CELLS = ("cell", "cgi", "ci", "level_dbm", "bars")
-_OF_DAY = re.compile(r"\d{1,2}:\d\d")
 _OF_TECHNOLOGIES: Mapping[str, tuple[str, ...]] = {
     "lac": ("lac", "tac"),
     "ci": ("ci", "cid", "eci", "nci"),
@@ -284,15 +282,6 @@ def _names_in(mapped: Mapped, name: str) -> str:
         return ""
     whole = np.isfinite(parse_identities(np.array(sorted(words), dtype=object))["ci"])
     return "cgi" if whole.mean() > _MOSTLY else "cell"
-
-
-def with_dates(mapped: Mapped) -> Mapped:
-    """Return columns with times of day after the dates of the column ``date``, if there is one."""
-    rows, name = mapped.rows, mapped.rows.find(*mapped.names("time"))
-    if name in (None, DATE) or not rows.has(DATE) or not _OF_DAY.match(rows.first_text(name)):
-        return mapped
-    rows.reading.note(f"time: columns {DATE} and {name}")
-    return replace(mapped, rows=rows.joined(DATE, name), beside=(DATE,))
 
 
 def _stated(rows: Columns, own: Mapping[str, str]) -> dict[str, str]:

@@ -25,7 +25,7 @@ from mapfilter.tracks.readers.clocks.times import (
     without_midnights,
 )
 from mapfilter.tracks.readers.format import ReadOptions
-from mapfilter.tracks.readers.plain.mapped import DATE, Mapped
+from mapfilter.tracks.readers.plain.mapped import Mapped
 from mapfilter.tracks.readers.plain.weeks import (
     over_days,
     over_stuck_weeks,
@@ -256,9 +256,9 @@ def _note_gps(reading: Reading, name: str, known: Floats) -> None:
 
 def _over_midnight(mapped: Mapped, reading: Reading, time_s: Floats) -> Floats:
     """Return times that go on after midnight where a column of dates keeps the day of the start."""
-    dates = mapped.rows.texts(DATE)
-    dates = dates[mapped.rows.with_digits(DATE)]
-    if DATE not in mapped.beside or (dates[1:] != dates[:-1]).any():
+    dates = mapped.rows.texts(*mapped.beside)
+    dates = dates[mapped.rows.with_digits(*mapped.beside)]
+    if not mapped.beside or (dates[1:] != dates[:-1]).any():
         return time_s
     known_s = time_s[np.isfinite(time_s)]
     before_s = [reading.last_s] if np.isfinite(reading.last_s) else []
