@@ -21,6 +21,7 @@ import rasterio
 from rasterio.errors import NotGeoreferencedWarning, RasterioError
 
 from mapfilter._inputs import check_file, open_input
+from mapfilter._words import likely_of_no_file
 from mapfilter.errors import InputError, MapfilterError, fail
 
 # Little and big endian, each also as BigTIFF.
@@ -157,7 +158,7 @@ def _is_strange(entry: os.DirEntry[str]) -> bool:
 
 def _check_is_tiff(path: Path) -> None:
     if not path.exists():
-        raise fail(InputError, str(path), "a raster file", "no such file", "a mistyped path")
+        raise fail(InputError, str(path), "a raster file", "no such file", likely_of_no_file(path))
     with open_input(path) as stream:
         head = stream.read(64)
     if head.startswith(_TIFF):

@@ -20,6 +20,7 @@ from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
+from mapfilter._words import likely_of_no_file
 from mapfilter.errors import InputError, MapfilterError, fail
 
 _NO_PATH = (errno.ENAMETOOLONG, errno.ELOOP)
@@ -290,4 +291,5 @@ def _unreadable(
     path: Path, error: OSError | ValueError, kind: type[MapfilterError]
 ) -> MapfilterError:
     got = getattr(error, "strerror", None) or error
-    return fail(kind, str(path), "a readable file", got)
+    hint = likely_of_no_file(path, "") if isinstance(error, FileNotFoundError) else ""
+    return fail(kind, str(path), "a readable file", got, hint)

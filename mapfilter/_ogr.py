@@ -18,6 +18,7 @@ from typing import NamedTuple
 import pyogrio
 
 from mapfilter._inputs import check_file, open_input
+from mapfilter._words import likely_of_no_file
 from mapfilter.errors import InputError, MapfilterError, fail
 
 FORMATS = (
@@ -97,7 +98,7 @@ def vector_source(path: Path) -> VectorSource:
                 check_file(inner)
         return VectorSource(path.absolute(), {})
     if not path.exists():
-        hint = "a mistyped path, or one relative to another folder"
+        hint = likely_of_no_file(path, "a mistyped path, or one relative to another folder")
         raise fail(InputError, str(path), "a vector file", "no such file", hint)
     size_bytes = check_file(path)
     if size_bytes == 0:

@@ -1,6 +1,12 @@
-"""Numbers of things, in words."""
+"""Numbers of things in words, and what a path means that leads nowhere."""
 
 from __future__ import annotations
+
+import re
+
+_ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/")
+"""Of two letters or more before the colon: one is a drive. A Path has one of the two strokes."""
+_PATTERN = re.compile(r"[*?\[]")
 
 
 def counted(count: int, what: str) -> str:
@@ -32,3 +38,26 @@ def number_of(count: int, one: str, many: str = "") -> str:
     ('1 row', '2 rows', '0 values are')
     """
     return f"{count} {one if count == 1 else many or one + 's'}"
+
+
+def likely_of_no_file(path: object, otherwise: str = "a mistyped path") -> str:
+    """Return the likely mistake behind a path at which there is nothing.
+
+    Parameters
+    ----------
+    otherwise : str
+        What is likely of a plain path.
+
+    Examples
+    --------
+    >>> likely_of_no_file("~/walk.csv"), likely_of_no_file("walk.cvs")
+    ('~ is not expanded; give os.path.expanduser of it', 'a mistyped path')
+    """
+    text = str(path)
+    if _ADDRESS.match(text):
+        return "an address; download the file and give its path"
+    if text.startswith("~"):
+        return "~ is not expanded; give os.path.expanduser of it"
+    if _PATTERN.search(text):
+        return "a pattern, which is not expanded; give the paths, such as those of glob.glob"
+    return otherwise

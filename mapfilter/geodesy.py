@@ -7,6 +7,8 @@ The angle between true and grid north, by which azimuths and headings differ
 from __future__ import annotations
 
 from functools import lru_cache
+from math import isnan
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -185,11 +187,21 @@ def utm_zone_crs(zone: int, lat_deg: float) -> str:
 def utm_crs(lon_deg: float, lat_deg: float) -> str:
     """Return the WGS 84 / UTM zone of a place; UPS (east, north) beyond 84° N and 80° S.
 
+    Raises
+    ------
+    InputError
+        These are no degrees, or none in their range.
+
     Examples
     --------
     >>> utm_crs(-8.6, 41.1), utm_crs(24.9, 60.2), utm_crs(18.4, -33.9), utm_crs(0.0, 89.0)
     ('EPSG:32629', 'EPSG:32635', 'EPSG:32734', 'EPSG:5041')
     """
+    if not (isinstance(lat_deg, Real) and isinstance(lon_deg, Real)):
+        got = f"{shown(lat_deg)}, {shown(lon_deg)}"
+        raise fail(InputError, "latitude, longitude", "two numbers in degrees", got)
+    if wrong := degree_fault(float(lat_deg), float(lon_deg)):
+        raise fail(InputError, "latitude, longitude", *wrong)
     if lat_deg > _MOST_UTM_DEG or lat_deg < _LEAST_UTM_DEG:
         return "EPSG:5041" if lat_deg > 0 else "EPSG:5042"
     return utm_zone_crs(utm_zone(lon_deg, lat_deg), lat_deg)
@@ -236,6 +248,8 @@ def degree_fault(lat_deg: float, lon_deg: float) -> tuple[str, str, str] | None:
         return None
     swapped = max(abs(lat_deg), abs(lon_deg)) <= 180
     hint = "longitude and latitude swapped" if swapped else "metres given for degrees"
+    if isnan(lat_deg) or isnan(lon_deg):
+        hint = ""
     return "degrees in -90..90 and -180..180", f"{lat_deg:g}, {lon_deg:g}", hint
 
 

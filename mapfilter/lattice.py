@@ -7,13 +7,15 @@ corner, as in GDAL.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
+from numbers import Real
 from typing import Any
 
 import numpy as np
 
-from mapfilter._types import Floats
+from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError, fail
-from mapfilter.geodesy import same_crs, short_crs, unproject
+from mapfilter.geodesy import projected_crs, same_crs, short_crs, unproject
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +32,11 @@ class Lattice:
         Side of a pixel.
     rows, cols : int
         Size; row 0 is the northern edge.
+
+    Raises
+    ------
+    InputError
+        The CRS is not projected, a length is no finite number, or the size no whole one.
 
     Examples
     --------
@@ -51,12 +58,19 @@ class Lattice:
 
     def __post_init__(self) -> None:
         faults = Faults()
-        if not np.isfinite([self.west_m, self.north_m]).all():
+        try:
+            projected_crs(self.crs, "lattice crs")
+        except InputError as error:
+            faults.found.extend(error.faults)
+        if not (_is_finite(self.west_m) and _is_finite(self.north_m)):
             faults.add("lattice corner", "finite metres", (self.west_m, self.north_m))
-        if not (np.isfinite(self.resolution_m) and self.resolution_m > 0):
+        if not (_is_finite(self.resolution_m) and self.resolution_m > 0):
             faults.add("lattice resolution", "metres > 0", self.resolution_m)
-        if self.rows < 1 or self.cols < 1:
-            faults.add("lattice size", "at least one pixel", f"{self.rows} x {self.cols}")
+        size = f"{self.rows} x {self.cols}"
+        if not (hasattr(self.rows, "__index__") and hasattr(self.cols, "__index__")):
+            faults.add("lattice size", "whole numbers of rows and columns", size)
+        elif self.rows < 1 or self.cols < 1:
+            faults.add("lattice size", "at least one pixel", size)
         faults.raise_if_any(InputError)
 
     def __str__(self) -> str:
@@ -109,19 +123,24 @@ class Lattice:
 
     def east_north(self, row: Any, col: Any) -> Any:
         """Return the centres of pixels as (east_m, north_m), scalars or arrays."""
+        row, col = (np.asarray(one) if isinstance(one, list | tuple) else one for one in (row, col))
         return (
             self.west_m + (col + 0.5) * self.resolution_m,
             self.north_m - (row + 0.5) * self.resolution_m,
         )
 
     def row_col(self, east_m: Any, north_m: Any) -> Any:
-        """Return the pixels that hold positions as integer (row, col); they may lie outside."""
-        row = np.floor((self.north_m - np.asarray(north_m)) / self.resolution_m).astype(np.int64)
-        col = np.floor((np.asarray(east_m) - self.west_m) / self.resolution_m).astype(np.int64)
+        """Return the pixels that hold positions as integer (row, col); they may lie outside.
+
+        A position that is not finite lies in row and column -1.
+        """
+        row = _whole((self.north_m - np.asarray(north_m)) / self.resolution_m)
+        col = _whole((np.asarray(east_m) - self.west_m) / self.resolution_m)
         return (int(row), int(col)) if row.ndim == 0 else (row, col)
 
     def contains(self, row: Any, col: Any) -> Any:
         """Return which pixels lie on the lattice."""
+        row, col = (np.asarray(one) if isinstance(one, list | tuple) else one for one in (row, col))
         return (row >= 0) & (row < self.rows) & (col >= 0) & (col < self.cols)
 
     def window(self, row: int, col: int, rows: int, cols: int) -> Lattice:
@@ -158,3 +177,14 @@ def outside_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> Floats:
     off_east_m = np.maximum(np.maximum(west - east_m, east_m - east), 0.0)
     off_north_m = np.maximum(np.maximum(south - north_m, north_m - north), 0.0)
     return np.asarray(np.hypot(off_east_m, off_north_m))
+
+
+def _is_finite(value: Any) -> bool:
+    return isinstance(value, Real) and isfinite(value)
+
+
+def _whole(number: Floats) -> Ints:
+    """Return the largest whole numbers below; -1 where there is none."""
+    below = np.floor(number)
+    known = np.isfinite(below)
+    return (below if known.all() else np.where(known, below, -1.0)).astype(np.int64)

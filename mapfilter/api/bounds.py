@@ -51,6 +51,11 @@ class Bound:
         ----------
         ax : matplotlib Axes, optional
             Where to draw; a new figure when left out.
+
+        Raises
+        ------
+        ConfigError
+            What is given are no axes, such as a figure.
         """
         from mapfilter.report.basemap import BaseMap
         from mapfilter.report.coverage import plot_point_values

@@ -131,6 +131,11 @@ class Track:
         ----------
         ax : matplotlib Axes, optional
             Where to draw; a new figure when left out.
+
+        Raises
+        ------
+        ConfigError
+            What is given are no axes, such as a figure.
         """
         from mapfilter.report.track import plot_track
         from mapfilter.workflows.outputs.served import served_points, street_map

@@ -9,6 +9,7 @@ from numbers import Real
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from mapfilter._arguments import PATH, Argument, Entries, Setting, check_arguments, shown
 from mapfilter.api.python_words import python_log
@@ -83,8 +84,8 @@ def read_log(
     StoreError
         A file of a log is missing, cut off or changed since it was written.
     ConfigError
-        There is no path, one is no path, the CRS is no text, or another argument is of another
-        type.
+        There is no path, one is no path, such as an open file or a table, the CRS is no text, or
+        another argument is of another type.
     """
     check_arguments(
         "read_log",
@@ -163,7 +164,13 @@ def _several(name: str, paths: object) -> list[Path]:
     """Return paths as a list; ConfigError for what is none."""
     if isinstance(paths, str | os.PathLike):
         return [Path(paths)]
-    if isinstance(paths, bytes) or not isinstance(paths, Iterable):
+    if isinstance(paths, pd.DataFrame):
+        hint = "a table; mf.make_log(crs, motion=…) makes a log of it"
+        raise fail(ConfigError, f"read_log, {name}", _FILES, shown(paths), hint)
+    if hasattr(paths, "read"):
+        hint = "an open file; give its path"
+        raise fail(ConfigError, f"read_log, {name}", _FILES, shown(paths), hint)
+    if isinstance(paths, bytes | Mapping) or not isinstance(paths, Iterable):
         raise fail(ConfigError, f"read_log, {name}", _FILES, shown(paths))
     given = list(paths)
     items = (Argument(f"{name}[{i}]", one, PATH, "a path") for i, one in enumerate(given))

@@ -112,7 +112,8 @@ class Sweep:
         Raises
         ------
         ConfigError
-            There is no such figure, or no filter of the sweep claimed a position with a radius.
+            There is no such figure, what is given are no axes, or no filter of the sweep claimed a
+            position with a radius.
         """
         from mapfilter.report import claimed_radii
         from mapfilter.report.run_distributions import plot_run_distribution

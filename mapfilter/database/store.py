@@ -17,6 +17,7 @@ import pyarrow as pa
 from mapfilter._arguments import Setting, check_arguments, path_argument
 from mapfilter._io import left_aside
 from mapfilter._json_files import check_part
+from mapfilter._words import likely_of_no_file
 from mapfilter.database.checked import Part, generation_of, part_named
 from mapfilter.database.manifest import CELLS, MANIFEST, POINTS, read_manifest
 from mapfilter.database.parquet import Source, check_extent, count_rows, read_columns, write_columns
@@ -134,7 +135,7 @@ def _open(path: Path, verify: str, generation: str | None) -> RadioRouteDatabase
     if not path.is_dir():
         found = "a file" if path.exists() else "nothing"
         aside = left_aside(path)
-        hint = "a mistyped path"
+        hint = likely_of_no_file(path)
         if aside is not None:
             hint = f"a write that was cut short; the older database is {aside}, rename it"
         raise fail(StoreError, str(path), "a database folder", found, hint)

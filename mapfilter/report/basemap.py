@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from mapfilter._types import Floats
 from mapfilter.errors import Faults
 from mapfilter.lattice import Lattice
-from mapfilter.report.canvas import BLACK, GREY, STREET, Look, figure_of, new_figure
+from mapfilter.report.canvas import BLACK, GREY, STREET, Look, check_axes, figure_of, new_figure
 from mapfilter.report.ground import BaseMap as BaseMap
 from mapfilter.report.ground import Bounds as Bounds
 
@@ -82,6 +82,7 @@ def map_height_in(base: BaseMap, width_in: float) -> float:
 
 def map_axes(given: Axes | None, base: BaseMap, beside_in: float) -> Axes:
     """Return the axes of one map: those given, or new ones with so much room beside them."""
+    check_axes(given)
     if given is not None:
         return given
     axes = new_figure(MAP_IN + beside_in, map_height_in(base, MAP_IN) + 0.85).subplots()

@@ -23,7 +23,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
+from mapfilter._arguments import shown
 from mapfilter._types import Bools
+from mapfilter.errors import ConfigError, fail
 
 DPI = 150
 """Pixels per inch of every picture."""
@@ -104,8 +106,26 @@ def new_figure(width_in: float, height_in: float) -> Figure:
     return figure
 
 
+def check_axes(given: Axes | None) -> None:
+    """Check what is given to draw on.
+
+    Raises
+    ------
+    ConfigError
+        It is a figure, an array of axes, or anything else but axes or None.
+    """
+    hint = {
+        "Figure": "a figure; give ax=figure.subplots()",
+        "SubFigure": "a figure; give ax=figure.subplots()",
+        "ndarray": "several axes of plt.subplots; give one of them",
+    }.get(type(given).__name__, "")
+    if not isinstance(given, Axes | None):
+        raise fail(ConfigError, "plot, ax", "matplotlib axes, or None", shown(given), hint)
+
+
 def single_axes(given: Axes | None, width_in: float, height_in: float) -> Axes:
     """Return the axes given, or those of a new figure of a size in inches."""
+    check_axes(given)
     return new_figure(width_in, height_in).subplots() if given is None else given
 
 

@@ -21,6 +21,7 @@ from mapfilter.report.canvas import (
     SKY,
     VERMILLION,
     Look,
+    check_axes,
     legend,
     mark,
     new_figure,
@@ -65,6 +66,7 @@ def plot_track(
         shown = BaseMap(bounds_m or _NOWHERE_M)
     else:
         shown = base if bounds_m is None else base.zoomed(bounds_m)
+    check_axes(ax)
     axes = ax
     if axes is None:
         axes = new_figure(_MAP_IN + 0.8, map_height_in(shown, _MAP_IN) + 1.2).subplots()

@@ -12,6 +12,7 @@ import pyrosm
 from geopandas import GeoDataFrame
 
 from mapfilter._inputs import check_file
+from mapfilter._words import likely_of_no_file
 from mapfilter.errors import InputError, MapfilterError, fail
 from mapfilter.geodesy import unproject
 from mapfilter.roads.elements import BoxDeg, Query, Version
@@ -66,7 +67,7 @@ def resolve_map(name_or_path: str | Path) -> Path:
     path = Path(name_or_path)
     if not path.exists():
         known = ", ".join(EMBEDDED_MAPS)
-        hint = "a mistyped path, or one relative to another folder"
+        hint = likely_of_no_file(name, "a mistyped path, or one relative to another folder")
         expected = f"a map ({', '.join(SUFFIXES)}), or one of: {known}"
         raise fail(InputError, name, expected, "no such file", hint)
     if not path.name.lower().endswith(SUFFIXES):

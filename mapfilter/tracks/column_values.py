@@ -108,7 +108,7 @@ def _texts(column: Column, values: pd.Series, found: TableFaults) -> Any:
         # Not as text of pandas, which cannot hold half of a surrogate pair.
         filled = np.array([str(value) != "" for value in values], dtype=np.bool_)
         present = values.notna().to_numpy() & filled
-        known = [_text(v) if ok else None for v, ok in zip(values, present, strict=True)]
+        known = [text_of(v) if ok else None for v, ok in zip(values, present, strict=True)]
     texts = np.array([*known, None], dtype=object)[:-1][codes]
     if column.required:
         missing = np.array([*(text is None for text in known), True])[:-1]
@@ -127,8 +127,16 @@ def _texts(column: Column, values: pd.Series, found: TableFaults) -> Any:
     return pd.Series(texts, dtype=object)
 
 
-def _text(value: object) -> str:
-    """Return a value as text; whole numbers are floats where others of their column are missing."""
+def text_of(value: object) -> str:
+    """Return a value as text; whole numbers are floats where others of their column are missing.
+
+    Examples
+    --------
+    >>> text_of(12.0), text_of(12.5), text_of(b"S1A")
+    ('12', '12.5', 'S1A')
+    """
+    if isinstance(value, bytes):
+        return value.decode(errors="replace")
     if isinstance(value, float | np.floating) and float(value).is_integer():
         return str(int(value))
     return str(value)
@@ -144,6 +152,8 @@ def _is_unicode(text: str) -> bool:
 
 def _numbers(values: pd.Series) -> tuple[Floats, Bools]:
     """Return values as floats, and which of them could be read as a number or as missing."""
+    if pd.api.types.is_complex_dtype(values.dtype):
+        return np.zeros(len(values)), np.zeros(len(values), dtype=bool)
     if pd.api.types.is_numeric_dtype(values.dtype):
         number = values.to_numpy(dtype=np.float64, na_value=np.nan)
         return number, np.ones(len(number), dtype=bool)
@@ -180,6 +190,8 @@ def _number(value: object) -> float:
     """Return a number; ValueError for what only Python takes for one: 1_0, digits of others."""
     if isinstance(value, str) and (not value.isascii() or "_" in value):
         raise ValueError
+    if isinstance(value, complex | np.complexfloating):
+        raise TypeError
     return float(value)  # type: ignore[arg-type]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -86,7 +87,18 @@ def _as_timestamps(time: pd.Series) -> pd.Series:
     """Return times of any kind of timestamps as those of pandas, others as they are."""
     if isinstance(time.dtype, pd.ArrowDtype) and pa.types.is_timestamp(time.dtype.pyarrow_dtype):
         return pd.Series(pd.DatetimeIndex(time), index=time.index)
-    return time.infer_objects()
+    known = time.infer_objects()
+    if known.dtype == object and _are_zoned(known.dropna()):
+        # Before and after the clocks are put back pandas keeps several offsets as objects.
+        return pd.to_datetime(known, utc=True)
+    return known
+
+
+def _are_zoned(times: pd.Series) -> bool:
+    """Return whether all are moments with a time zone, each with its own."""
+    return len(times) > 0 and all(
+        isinstance(one, datetime) and one.tzinfo is not None for one in times
+    )
 
 
 def _other_times(time: pd.Series) -> tuple[str, str] | None:

@@ -28,6 +28,7 @@ from mapfilter._json_files import (
     read_json,
     write_json,
 )
+from mapfilter._words import likely_of_no_file
 from mapfilter.errors import Faults, InputError, MapfilterError, StoreError, fail
 from mapfilter.gnss.almanacs import read_yuma
 from mapfilter.tracks.imu_noise import parse_imu_noise
@@ -275,7 +276,7 @@ def _no_log(path: Path, expected: str) -> MapfilterError:
         if inner := sorted(path.glob(f"*/*/{HEAD}"))[:1]:
             hint = f"the logs are in {inner[0].parent.parent}"
         return fail(InputError, str(path), expected, "a folder without any", hint)
-    return fail(InputError, str(path), expected, "nothing", "a mistyped path")
+    return fail(InputError, str(path), expected, "nothing", likely_of_no_file(path))
 
 
 def _check_head(head: dict[str, Any], where: str) -> float:

@@ -173,3 +173,47 @@ def test_a_lattice_in_words_names_its_crs_in_short():
     )
     wkt = pyproj.CRS("+proj=tmerc +lon_0=9 +ellps=WGS84").to_wkt()
     assert str(Lattice(wkt, 0.0, 0.0, 5.0, 1, 1)).endswith(", unknown")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"crs": "EPSG:4326"}, r"^lattice crs: expected a projected CRS in metres, found WGS 84"),
+        ({"crs": ""}, r"^lattice crs: expected a projected CRS in metres, found none"),
+        (
+            {"rows": 4.5},
+            r"^lattice size: expected whole numbers of rows and columns, found 4.5 x 3",
+        ),
+        (
+            {"cols": 3.0},
+            r"^lattice size: expected whole numbers of rows and columns, found 2 x 3.0",
+        ),
+        ({"west_m": "500000"}, r"^lattice corner: expected finite metres, found \('500000', "),
+        ({"north_m": None}, r"^lattice corner: expected finite metres, found \(500000.0, None\)"),
+        ({"resolution_m": "5"}, r"^lattice resolution: expected metres > 0, found 5$"),
+    ],
+)
+def test_what_is_no_lattice_is_refused(change, message):
+    given = {
+        "crs": "EPSG:32629", "west_m": 500000.0, "north_m": 4500010.0, "resolution_m": 5.0,
+        "rows": 2, "cols": 3,
+    }  # fmt: skip
+    assert Lattice(**given | {"rows": np.int32(2), "west_m": np.float32(500000)}).rows == 2
+    with pytest.raises(InputError, match=message):
+        Lattice(**given | change)
+
+
+@pytest.mark.parametrize("unknown", [np.nan, np.inf, -np.inf])
+def test_positions_that_are_none_lie_outside(unknown):
+    lattice = Lattice("EPSG:32629", 500000.0, 4500010.0, 5.0, 2, 3)
+    assert lattice.row_col(unknown, 4500009.0) == (0, -1)
+    row, col = lattice.row_col([500001.0, unknown], [unknown, 4500001.0])
+    assert (row.tolist(), col.tolist()) == ([-1, 1], [0, -1])
+    assert lattice.contains(row, col).tolist() == [False, False]
+
+
+def test_pixels_may_be_lists():
+    lattice = Lattice("EPSG:32629", 500000.0, 4500010.0, 5.0, 2, 3)
+    east_m, north_m = lattice.east_north([0, 1], [0, 2])
+    assert (east_m.tolist(), north_m.tolist()) == ([500002.5, 500012.5], [4500007.5, 4500002.5])
+    assert lattice.contains([0, 2], (0, 2)).tolist() == [True, False]

@@ -51,6 +51,39 @@ def test_timestamps_of_arrow(zone):
         make_log(CRS, motion=none)
 
 
+@pytest.mark.parametrize("as_kept", [list, lambda times: [one.to_pydatetime() for one in times]])
+def test_timestamps_of_several_offsets(as_kept):
+    """Summer time ends between them; pandas keeps such columns as objects."""
+    texts = ("2026-10-25T03:59:59.25+03:00", "2026-10-25T03:00:00+02:00")
+    walk = pd.DataFrame({"time": as_kept([pd.Timestamp(one) for one in texts]), **STEPS})
+    assert walk["time"].dtype == object
+    log = make_log(CRS, motion=walk)
+    assert log.motion["time_s"].tolist() == [0.0, 0.75]
+    assert log.start_utc_s == pd.Timestamp(texts[0]).timestamp()
+    one_lacks = walk.assign(time=[walk["time"][0], walk["time"][1].replace(tzinfo=None)])
+    with pytest.raises(InputError, match=r"^motion"):
+        make_log(CRS, motion=one_lacks)
+
+
+def test_a_missing_timestamp_among_several_offsets_is_named():
+    texts = ("2026-10-25T03:59:59.25+03:00", "2026-10-25T03:00:00+02:00")
+    walk = pd.DataFrame({"time": [pd.Timestamp(texts[0]), pd.NaT], "step_m": [1.0, 1.0]})
+    more = pd.DataFrame({"time": [pd.Timestamp(texts[1])], "step_m": [1.0]})
+    several = pd.concat([walk, more], ignore_index=True).astype({"time": object})
+    with pytest.raises(InputError, match=r"^motion row 2, time_s: expected seconds, found nan$"):
+        make_log(CRS, motion=several)
+
+
+def test_ids_of_bytes_are_texts_and_complex_numbers_are_none():
+    radio = pd.DataFrame(
+        {"time_s": [0.0, 1.0], "role": "serving", "cell": [b"S1A", np.bytes_("B")]}
+    )
+    assert make_log(CRS, radio=radio).radio["cell"].tolist() == ["S1A", "B"]
+    walk = pd.DataFrame({"time_s": [0.0, 1.0], "step_m": [1.0 + 0j, 1.0 + 0j]})
+    with pytest.raises(InputError, match=r"motion row 1, step_m: expected metres, found \(1\+0j\)"):
+        make_log(CRS, motion=walk)
+
+
 @pytest.mark.parametrize("name", ["time", "time_s", "logged", "step_m", None])
 def test_timestamps_and_seconds_in_the_index(name):
     walk = pd.DataFrame(STEPS, index=TIMES.rename(name))

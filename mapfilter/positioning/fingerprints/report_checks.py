@@ -15,6 +15,7 @@ from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import projected_crs
 from mapfilter.radio.level_quantity import likely_of_positive
+from mapfilter.tracks.column_values import text_of
 
 _LOW_DBM, _HIGH_DBM = -200.0, 30.0
 """Phones report none above 0 dBm; what is predicted or drawn close to an antenna may be."""
@@ -113,16 +114,9 @@ def _cells(given: Any, faults: Faults) -> np.ndarray[Any, Any]:
     else:
         cells = np.asarray(pd.Series(given), dtype=object)
         wrong = np.array([pd.isna(cell) or cell == "" for cell in cells], dtype=np.bool_)
-        cells = np.array([_text(cell) for cell in cells], dtype=str)
+        cells = np.array([text_of(cell) for cell in cells], dtype=str)
     _add("cell", wrong, "the id of a transmitter", given, "leave the reading out", faults)
     return cells
-
-
-def _text(cell: object) -> str:
-    """Return an id as text; whole numbers are floats where others of their column are missing."""
-    if isinstance(cell, float | np.floating) and float(cell).is_integer():
-        return str(int(cell))
-    return str(cell)
 
 
 def _numbers(name: str, given: Any, faults: Faults) -> Floats:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
+from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail, listed
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.readers.clocks.local_times import parse_zone
@@ -95,7 +95,10 @@ def _expanded(paths: Sequence[Path]) -> tuple[list[Path], tuple[str, ...]]:
                 check_zipped(other, path)
         if not known:
             expected = f"recordings in the {'folder' if is_folder else 'ZIP'}"
-            raise fail(InputError, str(path), expected, "none in a known format")
+            logs = [p.name for p in sorted(path.iterdir()) if is_log(p)] if is_folder else []
+            got = "track logs" if logs else "none in a known format"
+            hint = f"name one of them: {listed(logs)}" if logs else ""
+            raise fail(InputError, str(path), expected, got, hint)
         others = [p.name for p in inner if p not in known]
         if others:
             notes.append(f"{path.name}: {', '.join(others)[:200]} left out, no recordings")

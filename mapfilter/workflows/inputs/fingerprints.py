@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from mapfilter._words import number_of
+from mapfilter._words import likely_of_no_file, number_of
 from mapfilter.database.manifest import MANIFEST
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail, noted
@@ -48,7 +48,7 @@ def read_database(
     """
     if not path.exists():
         expected = "a radio-route database, or logs or a table of reports whose places are known"
-        raise fail(InputError, str(path), expected, "nothing", "a mistyped path")
+        raise fail(InputError, str(path), expected, "nothing", likely_of_no_file(path))
     if (path / MANIFEST).is_file():
         opened = open_database(path)
         _refuse("--crs", crs, path, f"none, as it is in {short_crs(opened.lattice.crs)}")
