@@ -18,10 +18,10 @@ import pandas as pd
 import rasterio
 from scipy.ndimage import label
 
-from mapfilter.angles import wrap_rad
 from mapfilter.database.build import build_roads
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.sources import LayerRoutes
+from mapfilter.experiments.recorded.kitti import perfect_motion
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.filter import Filter
 from mapfilter.positioning.loop import locate
@@ -54,16 +54,6 @@ class Case:
 def read_drive(data: Path, drive: str) -> pd.DataFrame:
     """Read the true track of a drive."""
     return pd.read_csv(data / "truth" / f"{drive}.csv")
-
-
-def perfect(truth: pd.DataFrame) -> pd.DataFrame:
-    """Return the steps and turns between the rows of a true track."""
-    heading = truth["heading_rad"].to_numpy()
-    turn = np.append(0.0, wrap_rad(np.diff(heading)))
-    middle = heading - turn / 2
-    east, north = (np.append(0.0, np.diff(truth[name])) for name in ("east_m", "north_m"))
-    step = east * np.cos(middle) + north * np.sin(middle)
-    return pd.DataFrame({"time_s": truth["time_s"], "step_m": step, "turn_rad": turn})
 
 
 def with_errors(motion: pd.DataFrame, seed: int) -> pd.DataFrame:
@@ -118,18 +108,18 @@ def cases(data: Path, folder: Path) -> Iterator[Case]:
             yield Case("own", "00", name, log, everywhere, seed)
     for drive, truth in truths.items():
         for seed in SEEDS:
-            log = as_log(crs, with_errors(perfect(truth), seed), truth)
+            log = as_log(crs, with_errors(perfect_motion(truth), seed), truth)
             yield Case("own", drive, "made", log, everywhere, seed)
     for drive, truth in truths.items():
         for seed in SEEDS[:2]:
-            motion = turned_about(with_errors(perfect(truth), seed))
+            motion = turned_about(with_errors(perfect_motion(truth), seed))
             yield Case("turned", drive, "made", as_log(crs, motion, truth), everywhere, seed)
     for drive, truth in truths.items():
         raster = folder / f"{drive}.tif"
         without_piece(data / "roads.tif", truth, raster)
         away = options.over(over_raster(raster, folder / drive))
         for seed in SEEDS[:2]:
-            log = as_log(crs, with_errors(perfect(truth), seed), truth)
+            log = as_log(crs, with_errors(perfect_motion(truth), seed), truth)
             yield Case("away", drive, "made", log, away, seed)
 
 

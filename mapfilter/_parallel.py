@@ -200,3 +200,14 @@ def part_of(progress: Progress | None, part: int, parts: int) -> Progress | None
     if progress is None:
         return None
     return lambda done, total: progress(part * total + done, parts * total)
+
+
+def rest_of(progress: Progress | None, before: int, total: int) -> Progress:
+    """Return a progress that counts what is left of the work; what was done before is counted."""
+
+    def report(done: int, _: int = 0) -> None:
+        if progress is not None:
+            progress(before + done, total)
+
+    report(0)
+    return report

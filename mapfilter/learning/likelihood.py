@@ -126,13 +126,11 @@ def marginal(by_offset: Floats, sd_db: float, offsets_db: Floats = OFFSETS_DB) -
     return log_sum(by_offset + prior) - log_sum(prior)
 
 
-def posterior_offset(
-    by_offset: Floats, sd_db: float, offsets_db: Floats = OFFSETS_DB
-) -> tuple[float, float]:
+def posterior_offset(by_offset: Floats, sd_db: float) -> tuple[float, float]:
     """Return mean and standard deviation of the offset under the prior N(0, sd²)."""
-    weight = by_offset - 0.5 * (offsets_db / sd_db) ** 2
+    weight = by_offset - 0.5 * (OFFSETS_DB / sd_db) ** 2
     weight = np.exp(weight - log_sum(weight))
-    mean = float(weight @ offsets_db)
+    mean = float(weight @ OFFSETS_DB)
     # The grid's step does not let it vanish.
-    variance = float(weight @ (offsets_db - mean) ** 2)
-    return mean, max(variance, (offsets_db[1] - offsets_db[0]) ** 2 / 12) ** 0.5
+    variance = float(weight @ (OFFSETS_DB - mean) ** 2)
+    return mean, max(variance, (OFFSETS_DB[1] - OFFSETS_DB[0]) ** 2 / 12) ** 0.5

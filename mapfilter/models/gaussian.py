@@ -168,9 +168,9 @@ def deviations(where: str, given: ArrayLike, size: int, faults: Faults) -> Float
     return np.broadcast_to(found, (size,)).astype(np.float64)
 
 
-def checked_covariance(where: str, given: ArrayLike, size: int, faults: Faults) -> Floats:
-    """Check that a covariance is a symmetric positive definite matrix of a size."""
-    found = np.array(given, dtype=np.float64)
+def checked_covariance(given: ArrayLike, size: int, faults: Faults) -> Floats:
+    """Check that ``covariance_m2`` is a symmetric positive definite matrix of a size."""
+    where, found = "covariance_m2", np.array(given, dtype=np.float64)
     if found.shape != (size, size) or not np.isfinite(found).all():
         faults.add(where, f"finite numbers, shape ({size}, {size})", f"shape {found.shape}")
         return np.eye(size)

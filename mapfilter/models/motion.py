@@ -63,7 +63,7 @@ def clock_noise(
         Fritsche & Klein print T³ in Q12, where the dimension asks for T². As printed, the result
         is no covariance for long intervals (of :data:`QUARTZ`: 2 s).
     """
-    t = _positive("interval_s", interval_s)
+    t = _positive(interval_s)
     h0, h1, h2 = oscillator.h0, oscillator.h_minus1, oscillator.h_minus2
     power = 3 if cross_term == "as_printed" else 2
     bias = h0 * t / 2 + 2 * h1 * t**2 + 2 / 3 * np.pi**2 * h2 * t**3
@@ -144,7 +144,7 @@ def constant_velocity(
     >>> constant_velocity(2.0, 1.0, dimensions=1).noise.tolist()
     [[4.0, 4.0], [4.0, 4.0]]
     """
-    t = _positive("interval_s", interval_s)
+    t = _positive(interval_s)
     from scipy.linalg import block_diag
 
     sigma = np.broadcast_to(np.asarray(sigma_mps2, dtype=np.float64), (dimensions,))
@@ -167,7 +167,7 @@ def random_walk(interval_s: float, sigma_m: float, dimensions: int = 2) -> Linea
     >>> random_walk(4.0, 3.0).noise.tolist()
     [[36.0, 0.0], [0.0, 36.0]]
     """
-    t = _positive("interval_s", interval_s)
+    t = _positive(interval_s)
     if not (np.isfinite(sigma_m) and sigma_m >= 0):
         raise fail(InputError, "sigma_m", "metres >= 0", sigma_m)
     return LinearMotion(np.eye(dimensions), sigma_m**2 * t * np.eye(dimensions))
@@ -212,7 +212,7 @@ def scaled(motion: LinearMotion, factor: float) -> LinearMotion:
     return LinearMotion(motion.transition, factor * motion.noise)
 
 
-def _positive(where: str, value: float) -> float:
-    if not (np.isfinite(value) and value > 0):
-        raise fail(InputError, where, "seconds above 0", value)
-    return float(value)
+def _positive(interval_s: float) -> float:
+    if not (np.isfinite(interval_s) and interval_s > 0):
+        raise fail(InputError, "interval_s", "seconds above 0", interval_s)
+    return float(interval_s)

@@ -150,7 +150,7 @@ def position_fix(layout: StateLayout, covariance_m2: ArrayLike) -> GaussianTerms
     size = 2 if np.shape(covariance_m2) != (3, 3) else 3
     if size == 3 and layout.up is None:
         faults.add("covariance_m2", "2 x 2, as the state has no height", "3 x 3")
-    noise = checked_covariance("covariance_m2", covariance_m2, size, faults)
+    noise = checked_covariance(covariance_m2, size, faults)
     faults.raise_if_any(InputError)
     rows = terms(layout, COMPONENT, np.zeros((size, 3)), np.arange(size, dtype=np.float64)[:, None])
     names = ("east", "north", "up")[:size]

@@ -57,10 +57,10 @@ class RadialTail(Protocol):
         """Return the protection level for a risk; infinite where there is none."""
 
 
-def check_risk(risk: float, where: str = "risk") -> None:
+def check_risk(risk: float) -> None:
     """Check that a risk is a probability between 0 and 1; ConfigError if not."""
     if not 0 < risk < 1:
-        raise fail(ConfigError, where, "a probability between 0 and 1, such as 1e-3", risk)
+        raise fail(ConfigError, "risk", "a probability between 0 and 1, such as 1e-3", risk)
 
 
 def usable_risk(risk: float, p_none: float) -> float:

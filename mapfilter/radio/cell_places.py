@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from pathlib import Path
-from typing import Any
-
-from pyproj import CRS
 
 from mapfilter._constants import FOOT_M
+from mapfilter._crs_reach import area_of_use
 from mapfilter._words import number_of
 from mapfilter.errors import Faults
 from mapfilter.geodesy import degree_fault, project, unproject
@@ -91,14 +88,9 @@ def _place_fault(lat: float, lon: float, crs: str) -> tuple[str, str, str] | Non
     return f"a place where {crs} is used", f"{lat:g}, {lon:g}", hint
 
 
-@lru_cache(maxsize=16)
-def _area_of_use(crs: str) -> Any:
-    return CRS.from_user_input(crs).area_of_use
-
-
 def _near(crs: str, lon_deg: float, lat_deg: float) -> bool:
     """Return whether a place lies in, or within a few degrees of, the area a CRS is made for."""
-    area = _area_of_use(crs)
+    area = area_of_use(crs)
     if not (math.isfinite(lon_deg) and math.isfinite(lat_deg)):
         return False
     if area is None:

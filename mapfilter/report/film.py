@@ -47,7 +47,7 @@ _MOST_BYTES = 1 << 31
 
 _WIDTH_IN, _DPI = 6.4, 100
 _LABELS_IN, _ROW_IN, _TITLE_IN = 0.75, 0.2, 0.85
-_COLUMNS = 4
+_COLUMNS, _PER_SECOND = 4, 10
 _BELIEF = (0.0, 0.45, 0.70)
 _TRUTH = "#868686"
 _SEARCHING = "#8c8c8c"
@@ -117,7 +117,6 @@ def write_film(
     path: Path,
     *,
     title: str = "",
-    per_second: int = 10,
     progress: Progress | None = None,
 ) -> Path:
     """Write a film as GIF or, where ffmpeg is found, as MP4, by the suffix.
@@ -128,8 +127,6 @@ def write_film(
     ----------
     track : FilmTrack
         The run; each moment shows its way up to then.
-    per_second : float
-        Pictures a second.
     progress : callable, optional
         Called with the numbers of pictures drawn and of all.
 
@@ -157,7 +154,7 @@ def write_film(
     attribute(axes, base)
     bottom_legend(figure, _COLUMNS, marks)
     leap_m = _leap_m(track.estimate_m)
-    writer = animation.writers[name](fps=per_second)
+    writer = animation.writers[name](fps=_PER_SECOND)
     with atomic_file(path) as temporary:
         drawn: list[Artist] = []
         with writer.saving(figure_of(axes), str(temporary), _DPI):

@@ -194,9 +194,15 @@ def run_global_positioning(
         progress=progress,
         base=street_base(city.streets, area.streets.attribution) if drawn else None,
     )
-    result = EvaluateResult(
-        Path(config.area.map).name, seed, points, tuple(found), time.perf_counter() - began_s, out
-    )
+    return written(config, seed, points, found, began_s, out)
+
+
+def written(
+    config: Config, seed: int, points: int, found: Sequence[CaseResult], began_s: float, out: Path
+) -> EvaluateResult:
+    """Write the table of a benchmark that began at a time, and return its result."""
+    name, seconds = Path(config.area.map).name, time.perf_counter() - began_s
+    result = EvaluateResult(name, seed, points, tuple(found), seconds, out)
     write_json(out / TABLE, to_jsonable(result))
     return result
 

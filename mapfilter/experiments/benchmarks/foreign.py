@@ -12,10 +12,9 @@ import numpy as np
 
 from mapfilter._io import sha256_file
 from mapfilter._types import Floats
-from mapfilter.database.store import open_database
 from mapfilter.experiments.benchmarks.journeys import Walk
 from mapfilter.experiments.benchmarks.world_cases import CASES_OF, OtherWorld, WorldCase
-from mapfilter.experiments.sweep.world import SweepWorld, open_world
+from mapfilter.experiments.sweep.world import SweepWorld, open_world, opened_filter
 from mapfilter.positioning.filter import Filter, FilterOptions
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.simulation.worlds.faults import GivenInputs, given_inputs
@@ -109,7 +108,7 @@ class ForeignWorld:
     def filter(self, choice: FilterOptions, case: WorldCase, route: int) -> Filter[Any]:
         """Return the filter over the database that is given in a run of a case."""
         folder = self.folder / database_name(case.fault, route % VARIANTS)
-        return _filter(folder, choice, sha256_file(folder / "manifest.json"))
+        return opened_filter(folder, sha256_file(folder / "manifest.json"), choice)
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,8 +231,3 @@ def _city(streets: Path, ground: Path, sha256: str) -> City:  # noqa: ARG001
     world = open_world(streets)
     with np.load(ground, allow_pickle=False) as masks:
         return City(world, OpenGround(world.lattice, masks["open"], masks["built"]))
-
-
-@lru_cache(maxsize=32)
-def _filter(database: Path, choice: FilterOptions, sha256: str) -> Filter[Any]:
-    return choice.over(open_database(database, generation=sha256), ways=False)

@@ -149,12 +149,11 @@ def run_sum(
     combination: Combination,
     start: Started,
     rng: np.random.Generator,
-    parts: int = 9,
 ) -> Floats:
-    """Run a Gaussian sum of EKFs from a wide start, cut into ``parts`` along east and north."""
+    """Run a Gaussian sum of EKFs from a wide start, cut into 9 parts along east and north."""
     given, moving = measurement(combination), (MOTION.transition, MOTION.noise)
     readings = given.sample(states, rng)
-    first = split(np.zeros(4), start.covariance, {0: parts, 2: parts})
+    first = split(np.zeros(4), start.covariance, {0: 9, 2: 9})
     return run_mixtures(compiled(given), *moving, EKF, first, start.means, readings).means
 
 

@@ -55,9 +55,9 @@ def with_true_fixes(log: TrackLog, truth: Truth, which: Bools) -> TrackLog:
     return replace(log, gnss=gnss.sort_values("time_s", kind="stable", ignore_index=True))
 
 
-def with_start(log: TrackLog, truth: Truth, length_m: float = START_M) -> TrackLog:
+def with_start(log: TrackLog, truth: Truth) -> TrackLog:
     """Return a log with the true positions over the first metres of the way as fixes."""
-    return with_true_fixes(log, truth, truth.distance_at(truth.time_s) <= length_m)
+    return with_true_fixes(log, truth, truth.distance_at(truth.time_s) <= START_M)
 
 
 def with_true_motion(log: TrackLog, truth: Truth) -> TrackLog:

@@ -28,7 +28,6 @@ def score_journey(
     baseline_m: Floats = _NO_ERRORS,
     seconds: float = nan,
     asked: Callable[[bool, bool], bool | None] | None = None,
-    from_start: bool = False,
 ) -> Found:
     """Score a journey from CONVERGED on.
 
@@ -41,8 +40,6 @@ def score_journey(
     asked : callable, optional
         From "claimed a position" and "first claim more than 50 m off" to success; by default a
         claim that is not wrong. Neither is known where the ground truth does not tell.
-    from_start : bool
-        Score all epochs with a position, as of smoothed tracks.
     """
     errors_m = position_errors_m(estimate, truth)
     switch = estimate.converged_at
@@ -52,7 +49,7 @@ def score_journey(
     told = not claimed or bool(truth.tells(time_s))
     wrong = claimed and not first_m <= SUCCESS_RADIUS_M if told else None
     at = np.arange(len(estimate))
-    since = 0 if from_start else (len(estimate) if switch is None else switch)
+    since = len(estimate) if switch is None else switch
     scored = (at >= since) & np.isfinite(errors_m)
     success = None
     if wrong is not None:

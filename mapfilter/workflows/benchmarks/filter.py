@@ -15,6 +15,7 @@ from statistics import median
 import numpy as np
 
 from mapfilter._kernels import draw_key
+from mapfilter._threads import ONE, Threads
 from mapfilter._types import Floats32
 from mapfilter.config.load import load_config
 from mapfilter.database.estimate import peak_memory_bytes
@@ -203,12 +204,6 @@ def step_inputs(model: BayesModel, log: TrackLog, count: int) -> tuple[StepInput
 def _step(model: BayesModel, log: TrackLog, count: int, runs: int) -> StepBench:
     given, belief = step_inputs(model, log, count)
     rng, jitter = np.random.default_rng(1), np.array(JITTER, np.float32)
-    always = ParticleOptions(count, count, count, resample_below=0.999999, mass_exponent=1.0)
-    filter_ = ParticleFilter(model, always)
-
-    def by_filter() -> object:
-        moved, _ = filter_.predict(belief, given.motion, rng)
-        return filter_.update(moved, given.reading, rng)
 
     def often(task: Callable[[], object]) -> Callable[[], object]:
         def row() -> None:
@@ -220,7 +215,7 @@ def _step(model: BayesModel, log: TrackLog, count: int, runs: int) -> StepBench:
 
     tasks = {
         "step": often(lambda: whole_step(given, belief, jitter, rng)),
-        "filter": often(by_filter),
+        "filter": often(filter_step(given, belief, rng)),
     }
     took_s = median_seconds(tasks, runs, time.process_time)
     step_ns, filter_ns = (1e9 * took_s[name] / (_PER_ROW * count) for name in tasks)
@@ -244,6 +239,21 @@ def whole_step(
     copies = np.empty_like(state)
     model.threads.over(count, (copy_with_jitter, state, chosen, jitter, draw_key(rng), copies))
     return copies, copies_of(cloud.kept, chosen)
+
+
+def filter_step(
+    given: StepInputs, belief: ParticleBelief, rng: np.random.Generator, threads: Threads = ONE
+) -> Callable[[], object]:
+    """Return a step of the filter, which always resamples."""
+    count = belief.log_weight.size
+    always = ParticleOptions(count, count, count, resample_below=0.999999, mass_exponent=1.0)
+    filter_ = ParticleFilter(given.model, always, threads)
+
+    def by_filter() -> object:
+        moved, _ = filter_.predict(belief, given.motion, rng)
+        return filter_.update(moved, given.reading, rng)
+
+    return by_filter
 
 
 def _track(positioner: BayesPositioner, log: TrackLog) -> tuple[float, int]:

@@ -14,12 +14,13 @@ import numpy as np
 
 from mapfilter._threads import ONE, Threads
 from mapfilter.database.store import open_database
-from mapfilter.filters.particle import ParticleBelief, ParticleFilter, ParticleOptions
+from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.tracks.store import read_log
 from mapfilter.workflows.benchmarks.filter import (
     JITTER,
     StepInputs,
+    filter_step,
     make_world,
     step_inputs,
     whole_step,
@@ -134,16 +135,10 @@ def _measured(
 
 def _tasks(given: StepInputs, belief: ParticleBelief, threads: Threads) -> tuple[Task, Task]:
     """Return a whole step, and one of the filter, both of which always resample."""
-    count, rng = belief.log_weight.size, np.random.default_rng(1)
+    rng = np.random.default_rng(1)
     inputs = replace(given, model=replace(given.model, threads=threads))
     jitter = np.array(JITTER, np.float32)
-    always = ParticleOptions(count, count, count, resample_below=0.999999, mass_exponent=1.0)
-    filter_ = ParticleFilter(inputs.model, always, threads)
-
-    def by_filter() -> object:
-        moved, _ = filter_.predict(belief, given.motion, rng)
-        return filter_.update(moved, given.reading, rng)
-
+    by_filter = filter_step(inputs, belief, rng, threads)
     return lambda: whole_step(inputs, belief, jitter, rng), by_filter
 
 

@@ -46,12 +46,11 @@ from mapfilter.simulation.worlds.radio import planners_offsets_db
 from mapfilter.simulation.worlds.sensor_faults import NO_FAULT
 from mapfilter.simulation.worlds.street_lines import StreetLines
 from mapfilter.tracks.store import write_log
-from mapfilter.workflows.evaluate import TABLE, EvaluateResult, check_names
+from mapfilter.workflows.evaluate import EvaluateResult, check_names, written
 from mapfilter.workflows.evaluations.runs import run_cases, street_base
 from mapfilter.workflows.evaluations.settings import load_benchmark
 from mapfilter.workflows.inputs.filter_choice import filter_choice
 from mapfilter.workflows.inputs.world import World
-from mapfilter.workflows.outputs.result_text import to_jsonable
 
 _DEFINED = "is part of the world, which has one definition"
 _REFUSED: Mapping[str, str] = {
@@ -150,11 +149,7 @@ def run_foreign(
         base=street_base(made.streets, area.streets.attribution) if drawn else None,
         pooled=frozenset(SENSORS) - {NO_FAULT},
     )
-    name = Path(config.area.map).name
-    seconds = time.perf_counter() - began_s
-    result = EvaluateResult(name, seed, points, tuple(found), seconds, out)
-    write_json(out / TABLE, to_jsonable(result))
-    return result
+    return written(config, seed, points, found, began_s, out)
 
 
 def prepare(

@@ -12,7 +12,7 @@ import numpy as np
 
 from mapfilter._io import ensure_writable_folder, sha256_file
 from mapfilter._json_files import write_json
-from mapfilter._parallel import Progress, local_executor, ordered_results
+from mapfilter._parallel import Progress, local_executor, ordered_results, rest_of
 from mapfilter._resume import kept_when_stopped, start_or_resume
 from mapfilter.config.sections import Config
 from mapfilter.database.store import open_database
@@ -164,13 +164,7 @@ def run_ottawa(
     }
     start_or_resume(out / HEAD, head, [task.result for task in tasks], resume=resume)
     todo = [task for task in tasks if not (resume and _is_whole(task.result))]
-    before = len(tasks) - len(todo)
-
-    def report(done: int, _: int) -> None:
-        if progress is not None:
-            progress(before + done, len(tasks))
-
-    report(0, 0)
+    report = rest_of(progress, len(tasks) - len(todo), len(tasks))
     with local_executor(workers) as executor:
         results = ordered_results(
             executor, find_left_out, todo, in_flight=2 * workers, progress=report

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from mapfilter._io import atomic_dir, ensure_writable_folder, sha256_file
 from mapfilter._json_files import write_json
-from mapfilter._parallel import Progress, local_executor, ordered_results, part_of
+from mapfilter._parallel import Progress, local_executor, ordered_results, part_of, rest_of
 from mapfilter._resume import kept_when_stopped, start_or_resume
 from mapfilter.errors import ConfigError, InputError, fail
 from mapfilter.experiments.accuracy_row import Row
@@ -157,13 +157,7 @@ def run_recorded(
     start_or_resume(out / HEAD, head, files, resume=resume)
     _prepare(benchmark, data / benchmark.folder, work)
     todo = [task for task in tasks if not (resume and read_scores(finished, task) is not None)]
-    before = len(tasks) - len(todo)
-
-    def report(done: int, _: int) -> None:
-        if progress is not None:
-            progress(before + done, len(tasks))
-
-    report(0, 0)
+    report = rest_of(progress, len(tasks) - len(todo), len(tasks))
     with local_executor(workers) as executor, kept_when_stopped("runs"):
         jobs = [(name, some, finished) for some in benchmark.together(todo, _MOST_TOGETHER)]
         judged = ordered_results(executor, _judge, jobs, in_flight=2 * workers)

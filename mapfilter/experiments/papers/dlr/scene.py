@@ -176,10 +176,10 @@ def dlr_scene() -> Scene:
     return Scene(houses, skyline, GasGround(lattice, free), stations)
 
 
-def draw_track(scene: Scene, rng: np.random.Generator, steps: int = STEPS) -> Track:
+def draw_track(scene: Scene, rng: np.random.Generator) -> Track:
     """Draw a pedestrian's walk, the time of day, and the shadowing of base stations."""
-    flat = gas_walk(scene.ground, steps, rng.uniform(*SPEED_MPS), rng)
-    place = np.column_stack([flat, np.full(steps, HEIGHT_M)])
+    flat = gas_walk(scene.ground, STEPS, rng.uniform(*SPEED_MPS), rng)
+    place = np.column_stack([flat, np.full(STEPS, HEIGHT_M)])
     strides = np.hypot(*np.diff(flat, axis=0).T)
     travelled = np.concatenate([[0.0], np.cumsum(strides)])
     satellites, gps = sky(rng.uniform(0.0, DAY_S))
