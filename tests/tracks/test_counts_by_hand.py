@@ -22,6 +22,7 @@ NAN = np.nan
         (range(4), [0, 0, 1, 8], [0, 0, 1, 8], 0),
         (range(4), [0, 0, NAN, 8], [0, 0, NAN, 8], 0),
         (range(2), [8, 0], [8, 0], 0),
+        (range(2), [0, 8], [0, 8], 1),
         # Over the time since the last step, else since the first row.
         (range(6), [0, 2, 0, 0, 0, 8], [0, 2, 2, 2, 2, 2], 1),
         (range(5), [0, 0, 0, 0, 8], [0, 2, 2, 2, 2], 1),
