@@ -117,7 +117,8 @@ def _choose(
 ) -> None:
     """Take one of the courses (N, K) for each hypothesis, (N,)."""
     ahead = _F((1 - aside) * (1 - around) / _BENDS)
-    turned, back = _F(aside / (2 * _SIDE)), _F((1 - aside) * around / _AROUND)
+    turned = _F(aside / (2 * _SIDE))
+    back = _F((1 - aside) * around / _AROUND)
     least, half, number, sharp = _F(_LEAST), _F(0.5), 0, _F(_SHARPNESS)
     for i in range(chosen.size):
         drawn, _ = uniforms(hashed(key, np.uint64(i * _DRAWS + _COURSES)))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mapfilter.models.street_motion import BIAS, EAST, NORTH, RATE, TURN, MotionErrors, move
-from mapfilter.models.way_course import with_courses
+from mapfilter.models.way_course import _choose, with_courses
 from mapfilter.models.way_map import map_log_likelihood
 
 ERRORS = MotionErrors(
@@ -126,3 +126,24 @@ def test_without_any_way_courses_are_as_usual():
     bend_rad = ERRORS.bend_rad_per_sqrt_m * np.sqrt(LEG_M)
     straight = turned[np.abs(turned) < np.radians(20)]
     assert np.std(straight) == pytest.approx(bend_rad, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("others", "on_way"),
+    [(-0.25, ()), (-0.25, (0, 5, 6, 13)), (-0.25, (4, 12)), (-6.0, (4,)), (-50.0, (4,))],
+)
+def test_each_course_has_its_share(others, on_way):
+    """The usual one of its kind, times the cube of the map's likelihood half and all the way."""
+    count, aside, around = 100_000, 0.4, 0.2
+    usual = np.array([0.6 * 0.8 / 5] * 5 + [0.4 / 8] * 8 + [0.6 * 0.2])
+    log_map = np.full((14, 2), [others - 0.25, others], dtype=np.float32)
+    log_map[list(on_way)] = [0.0, -0.1] if others > -1 else -5.9
+    # Far from all ways none is less likely than by six.
+    weight = usual * np.exp(3 * np.maximum(log_map.mean(axis=1), -6))
+    course = np.tile(np.arange(14, dtype=np.float32), (count, 1))
+    chosen = np.empty(count, dtype=np.float32)
+    drawn = np.tile(log_map.ravel(), count)
+    _choose(course, drawn, aside, around, np.uint64(5), chosen)
+    share = np.bincount(chosen.astype(int), minlength=14) / count
+    # Five standard errors.
+    np.testing.assert_allclose(share, weight / weight.sum(), atol=5 * (0.15 / count) ** 0.5)
