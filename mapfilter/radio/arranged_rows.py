@@ -57,7 +57,8 @@ class RowTally:
             carrier = header[picked["arfcn"][0]]
             notes.append(f"frequency_mhz is not taken from {carrier!r}; set cells.frequency_mhz")
         if self.made["frequency_mhz"]:
-            some, band = number_of(self.made["frequency_mhz"], "cell"), header[picked["band"][0]]
+            some = number_of(self.made["frequency_mhz"], "cell")
+            band = header[(picked.get("band") or picked["frequency_mhz"])[0]]
             notes.append(
                 f"frequency_mhz of {some} is the number in the name of the band ({band!r})"
             )

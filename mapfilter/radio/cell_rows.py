@@ -19,6 +19,7 @@ from mapfilter.radio.cell_rules import (
     antenna_fault,
     assumed_fault,
     id_fault,
+    site_fault,
 )
 from mapfilter.radio.identities import technology
 from mapfilter.radio.sexagesimal import sexagesimal_deg
@@ -31,10 +32,7 @@ DEFAULT_HINT = "set cells.{}, which is then taken for all cells without one"
 _TRUE, _FALSE = {"1", "true", "yes", "y"}, {"0", "false", "no", "n"}
 _HEMISPHERES = {"lat": "NS", "lon": "EW"}
 _LONGEST_SHOWN = 80
-_SLASH = {
-    "cell": "no file can have this name: give the cell that of its raster, as with _",
-    "site": "no file can have this name: write it otherwise, as with _",
-}
+_SLASH = "no file can have this name: give the cell that of its raster, as with _"
 
 
 @dataclass(slots=True)
@@ -71,10 +69,10 @@ def row_of(where: str, line: int, given: Mapping[str, str], table: Arranged, fau
         return value
 
     values["id"], values["site"] = given["cell"], given.get("site") or given["cell"]
-    for name, key in (("cell", "id"), ("site", "site")):
-        if wrong := id_fault(values[key]):
-            slash = any(mark in values[key] for mark in "/\\")
-            refuse(name, *wrong, _SLASH[name] if slash else "")
+    if wrong := id_fault(values["id"]):
+        refuse("cell", *wrong, _SLASH if any(mark in values["id"] for mark in "/\\") else "")
+    if given.get("site") and (wrong := site_fault(values["site"])):
+        refuse("site", *wrong)
     for name, allowed in RANGES.items():
         if given.get(name):
             value = parse(name, allowed.expected)

@@ -103,11 +103,22 @@ _LIMITED = ("arfcn", "bsic", "lac", "ci")
 
 
 def id_fault(value: Any) -> tuple[str, str] | None:
-    """Return (expected, found) when ``value`` is no id of a cell or site, else None.
+    """Return (expected, found) when ``value`` is no id of a cell, else None.
 
     Ids become file names, so separators, ``..`` and control characters are refused.
     """
     expected = f"an id of 1..{_LONGEST_ID} characters without /, \\, .. and control characters"
+    if wrong := _name_fault(value, expected):
+        return wrong
+    return (expected, repr(value)) if "/" in value or "\\" in value or ".." in value else None
+
+
+def site_fault(value: Any) -> tuple[str, str] | None:
+    """Return (expected, found) when ``value`` is no name of a site, else None."""
+    return _name_fault(value, f"a name of 1..{_LONGEST_ID} characters without control characters")
+
+
+def _name_fault(value: Any, expected: str) -> tuple[str, str] | None:
     if not isinstance(value, str):
         return expected, type(value).__name__
     if not value.strip():
@@ -116,9 +127,7 @@ def id_fault(value: Any) -> tuple[str, str] | None:
         return "an id without blanks around it", repr(value)
     if len(value) > _LONGEST_ID:
         return expected, f"{len(value)} characters"
-    if "/" in value or "\\" in value or ".." in value or _CONTROL.search(value):
-        return expected, repr(value)
-    return None
+    return (expected, repr(value)) if _CONTROL.search(value) else None
 
 
 def check_fields(where: str, names: Iterable[str], known: Iterable[str], faults: Faults) -> None:

@@ -24,6 +24,7 @@ from mapfilter.radio.cell_rules import (
     assumed_fault,
     id_fault,
     looks_like_radians,
+    site_fault,
     technology_faults,
 )
 
@@ -234,8 +235,8 @@ def check_cells(
 
 
 def _check_fields(cell: Cell, where: Callable[[str], str], faults: Faults) -> None:
-    for name in ("id", "site"):
-        if wrong := id_fault(getattr(cell, name)):
+    for name, wrong in (("id", id_fault(cell.id)), ("site", site_fault(cell.site))):
+        if wrong:
             faults.add(where(name), *wrong)
     if wrong := antenna_fault(cell.antenna):
         faults.add(where("antenna"), *wrong)

@@ -219,3 +219,9 @@ def _read_anew(
 def boxes_overlap(a: Sequence[float], b: Sequence[float]) -> bool:
     """Return whether two boxes west, south, east, north have an area in common."""
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+def overlaps_swapped(box: BoxDeg, other: BoxDeg) -> bool:
+    """Return whether a box in degrees is at another one once its longitudes are its latitudes."""
+    west, south, east, north = box
+    return boxes_overlap((south, west, north, east), other) and not boxes_overlap(box, other)

@@ -162,6 +162,22 @@ def test_they_are_noted_with_a_map_of_columns_too(tmp_path):
     ]
 
 
+def test_a_band_that_is_named_for_the_frequency_states_it(tmp_path):
+    text = SHOWN.replace("Frequency Band", "Frequenzband")
+    plan = read(tmp_path, text, columns={"frequency_mhz": "Frequenzband"})
+    assert plan["K1"].frequency_mhz == 1800.0
+    assert OF_BAND.replace("Frequency Band", "Frequenzband") in plan.notes
+    named = {"columns": {"frequency_mhz": "Frequenzband"}}
+    assert "expected MHz" in complaint(tmp_path, text.replace("GSM 1800", "E-UTRA 3"), **named)
+
+
+def test_a_name_of_a_site_becomes_no_file(tmp_path):
+    named = SHOWN.replace("Kamppi", "Kamppi / Nord..1")
+    assert read(tmp_path, named)["K1"].site == "Kamppi / Nord..1"
+    assert "row 2, Site (site): expected" in complaint(tmp_path, named.replace(" / ", "\x07"))
+    assert "no file can have this name" in complaint(tmp_path, SHOWN.replace("K1", "K/1"))
+
+
 @pytest.mark.parametrize("more", ["Comments", "Losses (dB)", "Active", "Cell type", "Y2"])
 def test_other_columns_are_ignored_without_a_word(more, tmp_path):
     text = SHOWN.replace("Frequency Band", more)

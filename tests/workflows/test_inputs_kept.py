@@ -9,9 +9,11 @@ import subprocess
 import sys
 import time
 
+import geopandas
 import numpy as np
 import pytest
 import rasterio
+import shapely
 from command_line import (
     ONE,
     Outcome,
@@ -284,3 +286,16 @@ def test_folders_that_nobody_may_write_to_are_read_and_refused_as_outputs(own_wo
     finally:
         for path in places:
             path.chmod(path.stat().st_mode | 0o200)
+
+
+def test_a_box_of_latitudes_first_over_rasters_is_named(own_world):
+    """Without a map of OpenStreetMap the rasters alone tell where the area is."""
+    layer = own_world.folder / "streets.gpkg"
+    line = shapely.LineString([(24.94, 60.165), (24.95, 60.17)])
+    geopandas.GeoDataFrame(geometry=[line], crs="EPSG:4326").to_file(layer)
+    given = {"area__map": "none", "roads__layer": layer, "rasters__path": own_world.rasters}
+    over = settings(**given, area__bbox="60.1645,24.9390,60.1710,24.9530")
+    refused = mapfilter("build", "-c", own_world.toml, *over)
+    assert_refused(refused, "area.bbox: expected", "longitude and latitude swapped")
+    checked = mapfilter("check", "-c", own_world.toml, *over, "--json")
+    assert [one["code"] for one in checked.json["findings"]] == ["lon-lat-swapped"]

@@ -19,7 +19,7 @@ from mapfilter.lattice import Lattice, outside_m
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.elements import BoxDeg
-from mapfilter.roads.maps import box_deg, boxes_overlap, map_bounds_deg
+from mapfilter.roads.maps import box_deg, boxes_overlap, map_bounds_deg, overlaps_swapped
 from mapfilter.roads.ways import Ways
 from mapfilter.workflows.inputs.world import area_lattice
 
@@ -51,6 +51,10 @@ def check_rasters_place(rasters: RxLevRasters, config: Config, findings: Finding
     if boxes_overlap(box, wanted_box):
         return True
     seen = f"The rasters cover {_shown(box)}, the area {_shown(wanted_box)} (degrees)."
+    if area.bbox is not None and overlaps_swapped(area.bbox, box):
+        evidence = f"{seen} With longitude and latitude exchanged they overlap."
+        findings.add("lon-lat-swapped", "area.bbox", evidence)
+        return False
     for crs in _other_systems(wanted_box):
         if not same_crs(crs, lattice.crs) and boxes_overlap(
             box_deg(crs, lattice.bounds_m), wanted_box

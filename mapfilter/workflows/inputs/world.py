@@ -26,7 +26,7 @@ from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.buildings import rasterise_heights
 from mapfilter.roads.landuse import LandUse
 from mapfilter.roads.lattice import RouteLattice
-from mapfilter.roads.maps import map_bounds_deg, resolve_map
+from mapfilter.roads.maps import box_deg, map_bounds_deg, overlaps_swapped, resolve_map
 from mapfilter.roads.route_points import route_lattice_from_landuse
 from mapfilter.roads.ways import Buildings, Ways
 from mapfilter.workflows.inputs.area_lattice import LARGEST_AREA_PX as LARGEST_AREA_PX
@@ -111,6 +111,12 @@ def covered_lattice(area: Area, rasters: RxLevRasters) -> Lattice:
     check_crs_of_area(area, rasters)
     if not area.has_box:
         return lattice
+    covered_deg = box_deg(lattice.crs, lattice.bounds_m)
+    if area.bbox is not None and overlaps_swapped(area.bbox, covered_deg):
+        sides = ", ".join(f"{side:.4f}" for side in covered_deg)
+        expected = f"an area that overlaps the rasters {rasters.path} ({sides})"
+        hint = "longitude and latitude swapped"
+        raise fail(InputError, "area.bbox", expected, area.bbox, hint)
     wanted = area_lattice(area.model_copy(update={"crs": lattice.crs}))
     found = pixels_on(lattice, wanted.bounds_m)
     if found is None:
