@@ -179,7 +179,9 @@ class _Submits(Protocol):
 
 def executor_argument(value: object) -> Argument:
     """Return the argument ``executor``, which may be None, to be checked."""
-    return Argument("executor", value, _Submits | None, "an executor of concurrent.futures")
+    # A class has the method, too, but nothing to call it of.
+    kinds = type(None) if isinstance(value, type) else _Submits | None
+    return Argument("executor", value, kinds, "an executor of concurrent.futures")
 
 
 def items(
