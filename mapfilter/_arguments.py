@@ -24,6 +24,7 @@ PATH: UnionType = operator.or_(Path | str, os.PathLike)
 FUNCTION: Any = Callable | None
 _SHOWN = Path | str | int | float | None
 _MOST_SHOWN = 60
+_AGAIN = "made before mapfilter was imported anew; make it again, or start Python again"
 
 Count = Annotated[int, Ge(1)]
 WholeNumber = Annotated[int, Ge(0)]
@@ -166,7 +167,8 @@ def check_arguments(
             faults.add(f"{function}, {wrong.name}", wrong.expected, shown(wrong.value), hint)
     for each in keywords:
         for wrong in _wrong(each):
-            faults.add(f"{function}, {wrong.name}", wrong.expected, shown(wrong.value))
+            hint = _AGAIN if isinstance(wrong, Argument) and _is_namesake(wrong) else ""
+            faults.add(f"{function}, {wrong.name}", wrong.expected, shown(wrong.value), hint)
     faults.raise_if_any(ConfigError)
 
 
@@ -179,7 +181,9 @@ class _Submits(Protocol):
 
 def executor_argument(value: object) -> Argument:
     """Return the argument ``executor``, which may be None, to be checked."""
-    return Argument("executor", value, _Submits | None, "an executor of concurrent.futures")
+    # A class has the method, too, but nothing to call it of.
+    kinds = type(None) if isinstance(value, type) else _Submits | None
+    return Argument("executor", value, kinds, "an executor of concurrent.futures")
 
 
 def items(
@@ -236,9 +240,21 @@ def _wrong(one: Argument | Setting | Entries) -> Sequence[Argument | Setting]:
 
 
 def _hint(one: Argument | Entries, arguments: Sequence[Argument | Entries]) -> str:
-    """Return that arguments were exchanged, where that would mend the call or one fault of it."""
+    """Return that arguments were exchanged, where that would mend the call or one fault of it.
+
+    Or that an object was made by classes of before, of which only their names are the same.
+    """
     for other in arguments:
         misplaced = one.accepts(other.value) or not other.accepts(other.value)
         if misplaced and other.accepts(one.value):
             return f"arguments exchanged; the order is {', '.join(each.name for each in arguments)}"
-    return ""
+    return _AGAIN if isinstance(one, Argument) and _is_namesake(one) else ""
+
+
+def _is_namesake(one: Argument) -> bool:
+    """Return whether a value's class has the name of one that is allowed, and is another."""
+    own = type(one.value)
+    kinds = get_args(one.kinds) or (one.kinds,)
+    return any(
+        (own.__module__, own.__qualname__) == (kind.__module__, kind.__qualname__) for kind in kinds
+    )

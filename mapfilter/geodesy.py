@@ -197,7 +197,8 @@ def utm_crs(lon_deg: float, lat_deg: float) -> str:
     >>> utm_crs(-8.6, 41.1), utm_crs(24.9, 60.2), utm_crs(18.4, -33.9), utm_crs(0.0, 89.0)
     ('EPSG:32629', 'EPSG:32635', 'EPSG:32734', 'EPSG:5041')
     """
-    if not (isinstance(lat_deg, Real) and isinstance(lon_deg, Real)):
+    given: Any = (lat_deg, lon_deg)
+    if not all(isinstance(one, Real) for one in given):
         got = f"{shown(lat_deg)}, {shown(lon_deg)}"
         raise fail(InputError, "latitude, longitude", "two numbers in degrees", got)
     if wrong := degree_fault(float(lat_deg), float(lon_deg)):

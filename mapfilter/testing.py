@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from mapfilter._arguments import Argument, check_arguments
 from mapfilter._same import same
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError
@@ -88,8 +89,17 @@ def check_filter(
         generator decides, one epoch at a time the same as the whole log, functions that return what
         they have to.
     ConfigError
-        The code of a custom filter ends in an error, with its file and line.
+        The code of a custom filter ends in an error, with its file and line; or database and log
+        are none.
+    ValueError
+        The log has fewer than ten epochs.
     """
+    check_arguments(
+        "check_filter",
+        Argument("filter_", filter_, object, "a filter, its options, its class or its name"),
+        Argument("database", database, RadioRouteDatabase, "a database of open_database or build"),
+        Argument("log", log, TrackLog, "a log of read_log or make_log"),
+    )
     with _named_clause():
         _check_filter(filter_, database, log, seed)
 

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Literal
 
 import pandas as pd
 
-from mapfilter._arguments import Setting, check_arguments
+from mapfilter._arguments import Argument, Setting, check_arguments
 from mapfilter._words import number_of
-from mapfilter.errors import ConfigError, fail
+from mapfilter.errors import ConfigError, fail, listed
 from mapfilter.evaluation.paired import paired_cells
 from mapfilter.evaluation.success_cells import HEADING, READING, success_cells
+from mapfilter.experiments.sweep.table import SCHEMA
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,10 +40,25 @@ class Sweep:
     Parameters
     ----------
     runs : DataFrame
-        One row for each run, see :data:`mapfilter.experiments.sweep.table.SCHEMA`.
+        One row for each run, see :data:`mapfilter.experiments.sweep.table.SCHEMA`; also some of
+        them, or as they were kept in a file.
+
+    Raises
+    ------
+    ConfigError
+        It is no table, or lacks a column.
     """
 
     runs: pd.DataFrame
+
+    def __post_init__(self) -> None:
+        check_arguments(
+            "Sweep", Argument("runs", self.runs, pd.DataFrame, "a table such as runs of a sweep")
+        )
+        lacking = [name for name in SCHEMA.names if name not in self.runs.columns]
+        if lacking:
+            expected = "the columns of mapfilter.experiments.sweep.table.SCHEMA"
+            raise fail(ConfigError, "Sweep, runs", expected, f"no {listed(lacking)}")
 
     def __repr__(self) -> str:
         runs = number_of(len(self.runs), "run")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -175,6 +175,10 @@ class CellPlan:
 
     def __len__(self) -> int:
         return len(self.cells)
+
+    def __iter__(self) -> Iterator[str]:
+        """Go over the ids, as ``in`` and ``[]`` take them; ``cells`` are the cells themselves."""
+        return iter(self.ids)
 
     def __contains__(self, cell_id: object) -> bool:
         return cell_id in self._positions

@@ -13,6 +13,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
+from mapfilter._inputs import shown
 from mapfilter._io import program_version
 from mapfilter.serving.documents import RequestError, one_fault, read_object
 from mapfilter.serving.door import PAGES, SAFE, Door, json_answer, no_route, read_body
@@ -119,16 +120,15 @@ class Service:
         return _with_fixes(value, found.fixes, "fixes")
 
     async def _events(self, request: Request) -> EventStream:
-        detail = request.query_params.get(_DETAIL) == "1"
+        detail, after = _asked_of(request)
         session = self._listened(request)
         if detail:
             await self.sessions.watch(session)
             # From here on nothing is awaited: neither session nor number of listeners changes.
             session = self._listened(request)
         # What a browser sends by itself when it comes back counts for more than the address.
-        last = request.headers.get("last-event-id") or request.query_params.get(_AFTER, "")
-        whole = last.isascii() and last.isdigit() and len(last) <= _MOST_DIGITS
-        listener = session.channel.listen(int(last) if whole else 0, detail)
+        last = request.headers.get("last-event-id", "")
+        listener = session.channel.listen(int(last) if _is_number(last) else after, detail)
         return EventStream(session.channel, listener, self.limits.send_s)
 
     def _listened(self, request: Request) -> Session:
@@ -152,6 +152,21 @@ class Service:
 
     async def _document(self, request: Request) -> dict[str, Any]:
         return read_object(await read_body(request, self.limits))
+
+
+def _asked_of(request: Request) -> tuple[bool, int]:
+    """Return whether a listener asks for details, and after which fix."""
+    detail = request.query_params.get(_DETAIL, "0")
+    if detail not in ("0", "1"):
+        raise one_fault(_DETAIL, "0 or 1", shown(detail))
+    after = request.query_params.get(_AFTER, "0")
+    if not _is_number(after):
+        raise one_fault(_AFTER, "the number of a fix, or 0", shown(after))
+    return detail == "1", int(after)
+
+
+def _is_number(text: str) -> bool:
+    return text.isascii() and text.isdigit() and len(text) <= _MOST_DIGITS
 
 
 def _shown(session: Session) -> dict[str, Any]:

@@ -353,3 +353,10 @@ def test_the_plan_that_ships_is_sound() -> None:
     lon, lat = unproject(CRS, [c.east_m for c in plan.cells], [c.north_m for c in plan.cells])
     assert ((lon > 24.9352) & (lon < 24.9534)).all()
     assert ((lat > 60.1642) & (lat < 60.1791)).all()
+
+
+def test_a_plan_is_gone_over_by_its_ids():
+    plan = CellPlan(CRS, (CELL, replace(CELL, id="B")))
+    assert list(plan) == ["A", "B"]
+    assert [plan[cell_id].id for cell_id in plan if cell_id in plan] == list(plan.ids)
+    assert dict.fromkeys(plan, 0) == {"A": 0, "B": 0}

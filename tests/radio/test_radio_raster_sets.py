@@ -106,7 +106,7 @@ def test_what_is_declared_must_not_contradict_the_file(tmp_path: Path) -> None:
 
 
 def test_a_crs_is_declared_for_files_without(tmp_path: Path) -> None:
-    _geotiff(tmp_path / "A.tif", replace(FINE, crs=None), _values(FINE))  # type: ignore[arg-type]
+    _geotiff(tmp_path / "A.tif", FINE, _values(FINE), crs=None)
     assert "CRS left out on export" in _complaint(tmp_path, crs=None)
     assert open_rasters(tmp_path, "level", crs=CRS).lattice == FINE
 

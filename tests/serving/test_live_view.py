@@ -264,6 +264,23 @@ def test_the_last_place_to_watch_is_given_once(made):
     assert sum(found) == 1
 
 
+@pytest.mark.parametrize("query", ["detail=2", "detail=true", "after=x", "after=-1", "after=1.5"])
+def test_what_a_listener_asks_for_in_vain_is_refused(made, query):
+    held, name = made(), query.partition("=")[0]
+
+    async def run():
+        app = held.app()
+        session = await begin(app)
+        path = f"/sessions/{session}/events"
+        refused = await asyncio.wait_for(ask(app, "GET", path, query=query.encode()), 10)
+        return refused, held.sessions.all[session].channel.listeners
+
+    refused, listeners = asyncio.run(run())
+    assert refused.code == 400
+    assert refused.json["error"]["errors"][0]["location"] == name
+    assert not listeners
+
+
 def test_a_full_session_is_refused_before_its_belief_is_made(made):
     held = made(listeners=1)
 

@@ -121,10 +121,11 @@ def _cells(given: Any, faults: Faults) -> np.ndarray[Any, Any]:
 
 def _numbers(name: str, given: Any, faults: Faults) -> Floats:
     try:
-        return pd.Series(given).to_numpy(dtype=np.float64, na_value=np.nan)
+        number: Floats = pd.Series(given).to_numpy(dtype=np.float64, na_value=np.nan)
     except (TypeError, ValueError) as error:
         faults.add(f"readings, {name}", "numbers", error)
         return np.zeros(len(given))
+    return number
 
 
 def _add(name: str, wrong: Bools, expected: str, given: Any, hint: str, faults: Faults) -> None:
