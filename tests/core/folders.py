@@ -1,10 +1,22 @@
 """Folders with a part deep inside, written and read as a whole."""
 
+import pytest
+
 from mapfilter._io import atomic_dir
+from mapfilter.errors import OutputError
 
 
 def names(folder):
     return sorted(path.name for path in folder.iterdir())
+
+
+def told(path, write):
+    """The one fault of what cannot be written."""
+    with pytest.raises(OutputError) as caught:
+        write()
+    (fault,) = caught.value.faults
+    assert fault.where == str(path)
+    return fault
 
 
 def write_folder(path, text):

@@ -8,12 +8,12 @@ import subprocess
 import sys
 
 import pytest
-from folders import names, read_folder, write_folder
+from folders import names, read_folder, told, write_folder
 
 from mapfilter import _replace
 from mapfilter._io import atomic_dir, atomic_file, ensure_writable_folder, left_aside, sha256_file
 from mapfilter._json_files import read_json, write_json
-from mapfilter.errors import OutputError, StoreError
+from mapfilter.errors import StoreError
 
 
 def test_sha256_of_a_file_longer_than_one_chunk(tmp_path):
@@ -113,14 +113,6 @@ def test_names_with_glob_signs_clean_only_their_own(tmp_path):
     with atomic_file(tmp_path / "a[b]") as temporary:
         temporary.write_text("")
     assert names(tmp_path) == [".ab.partial-0x-1", "a[b]"]
-
-
-def told(path, write):
-    with pytest.raises(OutputError) as caught:
-        write()
-    (fault,) = caught.value.faults
-    assert fault.where == str(path)
-    return fault
 
 
 def test_places_that_cannot_be_written_are_told(tmp_path):

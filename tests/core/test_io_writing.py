@@ -9,20 +9,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from folders import names, read_folder, write_folder
+from folders import names, read_folder, told, write_folder
 
 from mapfilter import _io, _replace
 from mapfilter._io import atomic_dir, atomic_file, replaced_files
 from mapfilter._json_files import check_replaceable, check_version, sealed
 from mapfilter.errors import OutputError, StoreError
-
-
-def told(path, write):
-    with pytest.raises(OutputError) as caught:
-        write()
-    (fault,) = caught.value.faults
-    assert fault.where == str(path)
-    return fault
 
 
 def fails(atomic, path, error):

@@ -6,14 +6,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from folders import names
 
 from mapfilter import _partial
 from mapfilter._io import atomic_dir, atomic_file, replaced_files
 from mapfilter._partial import ABANDONED_S, is_left, new_partial, nothing_left, partials
-
-
-def names(folder):
-    return sorted(path.name for path in folder.iterdir())
 
 
 @pytest.fixture

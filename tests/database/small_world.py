@@ -1,10 +1,12 @@
 """A small world: an L-shaped street, a square, three cells, and rasters of known levels."""
 
+import json
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
 
+from mapfilter._json_files import sealed
 from mapfilter.database.build import build
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
@@ -79,3 +81,13 @@ def make_database(world, folder):
     """Build the database of a world in tiles of 16 pixels."""
     out = folder / "database"
     return build(world.rasters, world.plan, world.routes, out, floor_dbm=FLOOR_DBM, tile_px=16)
+
+
+def contents(folder):
+    """The bytes of all files in a folder."""
+    return {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def change_manifest(folder, **changes):
+    manifest = json.loads((folder / "manifest.json").read_text())
+    (folder / "manifest.json").write_text(json.dumps(sealed({**manifest, **changes})))

@@ -2,7 +2,6 @@
 
 import errno
 from dataclasses import replace
-from pathlib import Path
 
 import duckdb
 import geopandas
@@ -15,6 +14,7 @@ from small_world import (
     FLOOR_DBM,
     IDS,
     LATTICE,
+    contents,
     make_plan,
     make_routes,
 )
@@ -32,10 +32,6 @@ from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
-
-
-def contents(folder: Path):
-    return {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
 def test_points_are_those_that_hear_a_cell(world, database):

@@ -7,7 +7,7 @@ from concurrent.futures import Executor
 import geopandas
 import numpy as np
 import pytest
-from small_world import LATTICE, make_plan
+from small_world import LATTICE, contents, make_plan
 
 from mapfilter._parallel import SerialExecutor
 from mapfilter.database.build import build
@@ -16,10 +16,6 @@ from mapfilter.database.manifest import InputFile
 from mapfilter.errors import OutputError
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
-
-
-def contents(folder):
-    return {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
 def test_provenance_is_recorded_by_role(world, tmp_path):

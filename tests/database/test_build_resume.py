@@ -14,7 +14,7 @@ import pytest
 import shapely
 from counting import Counting
 from killed_worker import KillsOneWorker
-from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_plan, make_routes
+from small_world import CRS, FLOOR_DBM, IDS, LATTICE, contents, make_plan, make_routes
 
 from mapfilter._cluster import cluster_executor
 from mapfilter._parallel import local_executor
@@ -37,10 +37,6 @@ TILE_PIXELS = 8 * 8 * len(IDS)
 def whole(world, tmp_path_factory):
     out = tmp_path_factory.mktemp("whole") / "db"
     return contents(build(world.rasters, world.plan, world.routes, out, **OPTIONS).path)
-
-
-def contents(folder: Path):
-    return {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
 def again(world, out, **more):

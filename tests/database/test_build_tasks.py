@@ -4,7 +4,7 @@ from concurrent.futures import Executor
 
 import numpy as np
 import pytest
-from small_world import CRS, FLOOR_DBM, LATTICE, make_routes
+from small_world import CRS, FLOOR_DBM, LATTICE, contents, make_routes
 
 from mapfilter._parallel import SerialExecutor
 from mapfilter._resume import FinishedParts
@@ -93,10 +93,6 @@ def interrupted(world, out):
 def again(world, out, **more):
     options = {"tile_px": 8, "pixels_a_task": 0, "in_flight": 1, **more}
     return build(world.rasters, world.plan, world.routes, out, **options)
-
-
-def contents(folder):
-    return {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
 def test_finished_tiles_are_not_read_again(world, tmp_path, monkeypatch):

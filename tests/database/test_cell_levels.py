@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pyarrow as pa
 import pytest
-from small_world import CRS, IDS, LATTICE, make_database, make_plan, make_world
+from small_world import CRS, IDS, LATTICE, make_plan
 
 from mapfilter.database import cell_levels
 from mapfilter.database.cell_levels import PointReader, part_extents, read_levels, received_cells
@@ -45,12 +45,6 @@ def write_points(folder, lattice, row, col, level_dbm=None, ids=IDS, tiles=1):
     parameters = {"margin_db": 6.0, "floor_dbm": -100.0, "tile_px": 60}
     Head(lattice, plan, parameters, "", (), counts).write(folder, written.parts)
     return open_database(folder)
-
-
-@pytest.fixture(scope="module")
-def database(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("world")
-    return make_database(make_world(folder), folder)
 
 
 def scattered(lattice, count, seed):

@@ -4,18 +4,12 @@ import json
 
 import pyarrow.parquet
 import pytest
-from small_world import IDS
+from small_world import IDS, change_manifest
 
-from mapfilter._json_files import sealed
 from mapfilter.database.export import export_geopackage
 from mapfilter.database.manifest import levels_folders
 from mapfilter.database.store import open_database
 from mapfilter.errors import StoreError
-
-
-def change_manifest(folder, **changes):
-    manifest = json.loads((folder / "manifest.json").read_text())
-    (folder / "manifest.json").write_text(json.dumps(sealed({**manifest, **changes})))
 
 
 def change_byte(part, place):

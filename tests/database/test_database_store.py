@@ -9,18 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from small_world import CRS, FLOOR_DBM, IDS, LATTICE, make_plan
+from small_world import CRS, FLOOR_DBM, IDS, LATTICE, change_manifest, make_plan
 
 from mapfilter._json_files import sealed
 from mapfilter.database.export import export_geopackage
 from mapfilter.database.manifest import apart, levels_folders
 from mapfilter.database.store import info, open_database, read_cells, write_cells
 from mapfilter.errors import InputError, OutputError, StoreError
-
-
-def change_manifest(folder, **changes):
-    manifest = json.loads((folder / "manifest.json").read_text())
-    (folder / "manifest.json").write_text(json.dumps(sealed({**manifest, **changes})))
 
 
 def test_what_was_built_is_what_is_opened(database, world):

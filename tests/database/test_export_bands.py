@@ -3,19 +3,12 @@
 import json
 
 import numpy as np
-import pytest
 import rasterio
-from small_world import IDS, LATTICE, make_database, make_world
+from small_world import IDS, LATTICE
 
 from mapfilter.database import export
 from mapfilter.database.export import export_cog
 from mapfilter.database.exported import CELLS_TAG
-
-
-@pytest.fixture(scope="module")
-def database(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("world")
-    return make_database(make_world(folder), folder)
 
 
 def test_the_bands_hold_the_values_of_the_points(database, tmp_path, monkeypatch):

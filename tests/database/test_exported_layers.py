@@ -6,16 +6,10 @@ import pandas as pd
 import pyogrio
 import pytest
 import shapely
-from small_world import CRS, IDS, LATTICE, make_database, make_world
+from small_world import CRS, IDS, LATTICE
 
 from mapfilter.database.export import export_geopackage, write_layers
 from mapfilter.errors import InputError, OutputError
-
-
-@pytest.fixture(scope="module")
-def database(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("world")
-    return make_database(make_world(folder), folder)
 
 
 @pytest.fixture(scope="module")

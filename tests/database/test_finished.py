@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import shapely
 from counting import Counting
-from small_world import CRS, FLOOR_DBM, LATTICE, levels_of, make_plan, make_routes
+from small_world import CRS, FLOOR_DBM, LATTICE, contents, levels_of, make_plan, make_routes
 
 from mapfilter import _resume
 from mapfilter._resume import FinishedParts
@@ -46,10 +46,6 @@ def inputs(tmp_path_factory):
         "tile_px": 8,
         "pixels_a_task": 0,
     }
-
-
-def contents(folder):
-    return {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
 def other_rasters(_, folder):

@@ -4,19 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_world import FLOOR_DBM, IDS, LATTICE, make_database, make_world
+from small_world import FLOOR_DBM, IDS, LATTICE
 
 from mapfilter.database.manifest import InputFile
 from mapfilter.database.rewrite import levels_of, rewrite, routes_of
 from mapfilter.database.store import open_database
 from mapfilter.errors import InputError, OutputError
 from mapfilter.radio.cells import CellPlan
-
-
-@pytest.fixture(scope="module")
-def database(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("world")
-    return make_database(make_world(folder), folder)
 
 
 def assert_points_are_those_of(found, expected):

@@ -8,12 +8,11 @@ from math import nan, pi
 import numpy as np
 import pandas as pd
 import pytest
-from cross_world import CRS, EAST, WALK, make_database, walk_log, walk_tables
+from cross_world import CRS, EAST, WALK, walk_log, walk_tables
 
 from mapfilter.filters.contract import MotionStep, Reason, Status, UpdateInfo
 from mapfilter.filters.grid import GridFilter
 from mapfilter.filters.particle import ParticleFilter, ParticleOptions
-from mapfilter.positioning.bayes.area.opened_area import open_area
 from mapfilter.positioning.bayes.beliefs.first_hypotheses import Start
 from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.filter import BayesPositioner
@@ -30,11 +29,6 @@ from mapfilter.tracks.log import make_log
 
 FEW = ParticleOptions(max_particles=4000, min_search_particles=2000, min_particles=500)
 READING = RadioReading(0, 0.5, under_null=-0.3, length_m=5.0)
-
-
-@pytest.fixture(scope="module")
-def area(tmp_path_factory):
-    return open_area(make_database(tmp_path_factory.mktemp("cross")))
 
 
 @pytest.fixture(scope="module")

@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from cross_world import CRS, WALK, make_database, make_plan, truth
+from cross_world import CRS, WALK, make_plan, truth
 
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.street_motion import MotionErrors
 from mapfilter.models.way_map import MapWeights
-from mapfilter.positioning.bayes.area.opened_area import open_area
 from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.sources.evidence_options import EvidenceOptions
@@ -25,11 +24,6 @@ ERRORS = MotionErrors(
     disturbances_per_m=0.0, remounts_per_m=0.0, rate_share=0.0,
 )  # fmt: skip
 COARSE_M, FINE_M = 50.0, 25.0
-
-
-@pytest.fixture(scope="module")
-def area(tmp_path_factory):
-    return open_area(make_database(tmp_path_factory.mktemp("cross")))
 
 
 @pytest.fixture(scope="module")

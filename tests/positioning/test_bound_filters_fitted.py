@@ -6,17 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from cross_world import WALK, make_database, walk_log
+from cross_world import WALK, walk_log
 
 import mapfilter as mf
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeRules
 
 LTE_M = 299_792_458 / 30.72e6 * 8
-
-
-@pytest.fixture(scope="module")
-def database(tmp_path_factory):
-    return make_database(tmp_path_factory.mktemp("cross"))
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from cross_world import CRS, LATTICE, levels_dbm, make_database, make_plan
+from cross_world import CRS, LATTICE, levels_dbm, make_plan
 
 from mapfilter.database.measured import Readings
 from mapfilter.positioning.fingerprints import sources
@@ -16,11 +16,6 @@ from mapfilter.positioning.fingerprints.sources import (
     reports_of_database,
     simulated_reports,
 )
-
-
-@pytest.fixture(scope="module")
-def database(tmp_path_factory):
-    return make_database(tmp_path_factory.mktemp("cross"))
 
 
 def by_place(reports):

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cross_world import make_database, walk_log
+from cross_world import walk_log
 
 from mapfilter.positioning.bayes.area.likely_points import (
     KEPT_REPORTS,
@@ -14,7 +14,6 @@ from mapfilter.positioning.bayes.area.likely_points import (
     likelihoods,
     likelihoods_on_ways,
 )
-from mapfilter.positioning.bayes.area.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.sources.evidence import FixedTerm
 from mapfilter.positioning.bayes.sources.radio import RadioSource
@@ -23,11 +22,6 @@ from mapfilter.positioning.loop import locate
 
 OPTIONS = BayesFilter(max_particles=2000, min_search_particles=1000, min_particles=500)
 LEFT_OUT = ["way_id", "way_probability", "radius_99_m", "protection_m"]
-
-
-@pytest.fixture(scope="module")
-def area(tmp_path_factory):
-    return open_area(make_database(tmp_path_factory.mktemp("cross")))
 
 
 def positioner(area):

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 import pytest
-from cross_world import CROSSING, make_database, walk_log, walk_tables
+from cross_world import CROSSING, walk_log, walk_tables
 
 from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Estimate, Reason, Status, UpdateInfo
@@ -15,11 +15,6 @@ from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.locators import BUILT_IN
 from mapfilter.positioning.step_output import Fix, StepOutput
 from mapfilter.testing import ContractError, check_filter
-
-
-@pytest.fixture(scope="module")
-def database(tmp_path_factory):
-    return make_database(tmp_path_factory.mktemp("cross"))
 
 
 def steps_of_5_m():

@@ -25,11 +25,6 @@ from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.routes import read_roads
 
 
-@pytest.fixture(scope="module")
-def database(tmp_path_factory):
-    return make_database(tmp_path_factory.mktemp("cross"))
-
-
 @pytest.mark.parametrize("name", mf.__all__)
 def test_every_name_loads_and_is_documented(name):
     assert getattr(mf, name).__doc__

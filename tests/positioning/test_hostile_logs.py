@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from cross_world import CRS, make_database, walk_tables
+from cross_world import CRS, walk_tables
 
 from mapfilter.api.located import locate
 from mapfilter.errors import MapfilterError
@@ -26,11 +26,6 @@ STRANGE = {
     "timing_advance": (0, 63, 3846),
 }
 FACTORS, SHIFTS_S = (1e-6, 0.1, 60.0, 1e4, 1e7), (-1e6, -30.0, 0.5, 1e3, 1e9)
-
-
-@pytest.fixture(scope="module")
-def database(tmp_path_factory):
-    return make_database(tmp_path_factory.mktemp("cross"))
 
 
 def tables(rng):

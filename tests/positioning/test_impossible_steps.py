@@ -4,7 +4,7 @@ from math import isnan, nan
 
 import numpy as np
 import pytest
-from cross_world import make_database, make_plan, walk_log
+from cross_world import make_plan, walk_log
 
 from mapfilter.api.located import locate
 from mapfilter.filters.contract import MotionStep, Reason, Status
@@ -17,11 +17,6 @@ from mapfilter.positioning.sensors.watching import watched
 
 SMALL = BayesFilter(max_particles=1500, min_search_particles=800, min_particles=300)
 WALKER = Pace(100.0, 100.0, 100, 1.0, 0.0, False, 1.4, 1.4, 2.0)
-
-
-@pytest.fixture(scope="module")
-def database(tmp_path_factory):
-    return make_database(tmp_path_factory.mktemp("cross"))
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from cross_world import make_database, walk_log
+from cross_world import walk_log
 
 from mapfilter.errors import ConfigError
 from mapfilter.filters.contract import Reason, Status
@@ -19,11 +19,6 @@ from mapfilter.positioning.merging import epochs
 from mapfilter.positioning.step_output import Fix, StepOutput
 
 FEW = BayesFilter(max_particles=4000, min_search_particles=2000, min_particles=500)
-
-
-@pytest.fixture(scope="module")
-def database(tmp_path_factory):
-    return make_database(tmp_path_factory.mktemp("cross"))
 
 
 @pytest.fixture(scope="module")

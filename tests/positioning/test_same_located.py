@@ -41,11 +41,6 @@ def make_database(folder, crs=CRS, east_m=0.0, north_m=0.0):
 
 
 @pytest.fixture(scope="module")
-def database(tmp_path_factory):
-    return make_database(tmp_path_factory.mktemp("cross"))
-
-
-@pytest.fixture(scope="module")
 def elsewhere(tmp_path_factory):
     folder = tmp_path_factory.mktemp("elsewhere")
     return make_database(folder, "EPSG:32733", **ELSEWHERE_M)

@@ -6,12 +6,11 @@ from math import hypot, nan, pi
 import numpy as np
 import pandas as pd
 import pytest
-from cross_world import CRS, make_database
+from cross_world import CRS
 
 from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.filters.grid import GridFilter
 from mapfilter.models.street_motion import STATES, MotionErrors, move
-from mapfilter.positioning.bayes.area.opened_area import open_area
 from mapfilter.positioning.bayes.beliefs.first_hypotheses import Start
 from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning
@@ -29,11 +28,6 @@ EXACT = MotionErrors(
 )  # fmt: skip
 ROUGH = 12.0
 STEP = MotionStep(10.0, 0.4, sampling_sd_m=ROUGH)
-
-
-@pytest.fixture(scope="module")
-def area(tmp_path_factory):
-    return open_area(make_database(tmp_path_factory.mktemp("cross")))
 
 
 @pytest.fixture(scope="module")

@@ -18,6 +18,9 @@ from mapfilter.cli import main
 ONE = "journey-0000-draw-000"
 """The first simulated log of the small world."""
 
+IDENTITIES = {"A": (3021, 117001), "B": (3021, 117002), "C": (3022, 117003)}
+"""LAC and CI of the cells in the plan with identities."""
+
 PROGRESS = re.compile(r"mapfilter: [^:]+: \d+ of \d+ \w+, [\d.]+ \w+/(s|min), \d+ s left")
 """What work that takes more than half a minute prints, as it does on a slow machine."""
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from command_line import ONE, assert_done, mapfilter, settings
+from check_world import base_levels
+from command_line import IDENTITIES, ONE, assert_done, mapfilter, settings
 
 from mapfilter.tracks.store import read_log, write_log
 
@@ -22,9 +23,6 @@ LOOKED_AT = {
     "test_film_command", "test_sweep_titles",
 }  # fmt: skip
 """Tests of pictures; others ask whether there are files, and of which names."""
-
-IDENTITIES = {"A": (3021, 117001), "B": (3021, 117002), "C": (3022, 117003)}
-"""LAC and CI of the cells in the plan with identities."""
 
 TOML = """[area]
 bbox = [24.9420, 60.1660, 24.9495, 60.1697]
@@ -122,6 +120,12 @@ def _small_pictures(request):
 def world(tmp_path_factory: pytest.TempPathFactory) -> World:
     """Plan, rasters, database and two journeys, made by the commands themselves."""
     return make_world(tmp_path_factory.mktemp("world"))
+
+
+@pytest.fixture(scope="module")
+def levels():
+    """Levels of the world of checks."""
+    return base_levels()
 
 
 @pytest.fixture(scope="session")

@@ -3,13 +3,8 @@
 from dataclasses import replace
 
 import pytest
-from check_world import LATTICE, base_levels, make_plan, make_world, write_tiff
+from check_world import LATTICE, make_plan, make_world, write_tiff
 from command_line import assert_refused, mapfilter
-
-
-@pytest.fixture(scope="module")
-def levels():
-    return base_levels()
 
 
 @pytest.fixture

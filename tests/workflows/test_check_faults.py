@@ -3,18 +3,13 @@
 import numpy as np
 import pytest
 import rasterio
-from check_world import base_levels, box_deg, make_world, shifted
+from check_world import box_deg, make_world, shifted
 from command_line import mapfilter
 from rasterio.transform import Affine
 
 from mapfilter.check import site_checks as check_peaks
 from mapfilter.check.place_fits import place_fits
 from mapfilter.lattice import Lattice
-
-
-@pytest.fixture(scope="module")
-def levels():
-    return base_levels()
 
 
 @pytest.fixture

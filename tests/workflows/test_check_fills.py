@@ -2,15 +2,10 @@
 
 import numpy as np
 import pytest
-from check_world import base_levels, make_world
+from check_world import make_world
 from command_line import mapfilter, settings
 
 from mapfilter.check.fills import filling_number
-
-
-@pytest.fixture(scope="module")
-def levels():
-    return base_levels()
 
 
 @pytest.fixture

@@ -1,17 +1,12 @@
 """Cells that reports cannot tell apart are found by ``check``."""
 
 import pytest
-from check_world import CRS, base_levels, make_world
+from check_world import CRS, make_world
 from command_line import mapfilter
 
 from mapfilter.check.findings import Findings
 from mapfilter.check.identity_checks import check_identities
 from mapfilter.radio.cells import Cell, CellPlan
-
-
-@pytest.fixture(scope="module")
-def levels():
-    return base_levels()
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import rasterio
 import shapely
-from check_world import CRS, LATTICE, SITES, base_levels, box_deg, make_world, write_tiff
+from check_world import CRS, LATTICE, SITES, box_deg, make_world, write_tiff
 from command_line import mapfilter
 
 from mapfilter.geodesy import unproject
@@ -14,11 +14,6 @@ from mapfilter.propagation.predict import predict
 from mapfilter.radio.cells import Cell, CellPlan
 
 OWN_LIST = [f"244-5-1-{number}" for number in (1, 2, 3)]
-
-
-@pytest.fixture(scope="module")
-def levels():
-    return base_levels()
 
 
 @pytest.fixture

@@ -3,15 +3,10 @@
 import re
 
 import pytest
-from check_world import base_levels, make_world, shifted
+from check_world import make_world, shifted
 from command_line import assert_done, assert_refused, mapfilter, settings
 
 from mapfilter.check.findings import Findings, paragraphs
-
-
-@pytest.fixture(scope="module")
-def levels():
-    return base_levels()
 
 
 @pytest.fixture

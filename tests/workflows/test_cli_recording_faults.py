@@ -5,8 +5,7 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
-from command_line import ONE, assert_done, assert_refused, mapfilter, settings
-from conftest import IDENTITIES
+from command_line import IDENTITIES, ONE, assert_done, assert_refused, mapfilter, settings
 
 from mapfilter.angles import azimuth_from_heading_deg
 from mapfilter.geodesy import unproject

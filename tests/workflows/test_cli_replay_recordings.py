@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from command_line import ONE, assert_done, assert_refused, mapfilter, settings
-from conftest import IDENTITIES
+from command_line import IDENTITIES, ONE, assert_done, assert_refused, mapfilter, settings
 from made_recordings import MADE
 
 from mapfilter.angles import azimuth_from_heading_deg

@@ -4,17 +4,12 @@ import csv
 
 import numpy as np
 import pytest
-from check_world import base_levels, make_plan, make_world
+from check_world import make_plan, make_world
 from command_line import assert_done, assert_refused, mapfilter, settings
 
 from mapfilter.database.store import open_database
 
 SHOWN = ("Transmitter", "Site", "X", "Y", "Height (m)", "Azimuth (°)", "EIRP (dBm)")
-
-
-@pytest.fixture(scope="module")
-def levels():
-    return base_levels()
 
 
 @pytest.fixture
