@@ -1,6 +1,6 @@
 """Numbers that pages state are those of the program: each text is made of its constants."""
 
-from math import degrees
+from math import degrees, pi
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +13,13 @@ from mapfilter.learning import cell_evidence, likelihood, network, visits
 from mapfilter.models import level_errors, street_motion, way_course, way_spread
 from mapfilter.models.level_memory import SLOTS, LevelMemory
 from mapfilter.models.street_motion import STATES
-from mapfilter.positioning import epochs, integrity, known_start
+from mapfilter.positioning import epochs, integrity, known_start, vehicle_signs
 from mapfilter.positioning.bayes import assembly, carriageways, options
 from mapfilter.positioning.bayes.area import area_frame, area_tiles, opened_area, tiled_area
 from mapfilter.positioning.bayes.beliefs import belief_filters, first_hypotheses, path
 from mapfilter.positioning.bayes.rivals import alternative, hold_rules, mirrored, step_units
+from mapfilter.positioning.fingerprints import options as single
+from mapfilter.positioning.fingerprints import planned
 from mapfilter.positioning.gnss import options as gnss_options
 from mapfilter.positioning.gnss import state as gnss_state
 from mapfilter.positioning.gnss import trail, wander
@@ -33,6 +35,24 @@ from mapfilter.positioning.sensors import (
 )
 from mapfilter.serving import epoch_rows, events, limits
 from mapfilter.tracks.checks import log_checks, motion_faults
+from mapfilter.tracks.joining import moved
+from mapfilter.tracks.pdr import (
+    carried_bias,
+    gyroscope,
+    heading,
+    height,
+    mounted_clock,
+    signals,
+    standing_bias,
+    steps,
+    turns,
+    vehicle_headings,
+    walk,
+)
+from mapfilter.tracks.pdr import options as pdr_options
+from mapfilter.tracks.readers.recorded import odometer_counts
+from mapfilter.viewing import ground, trace
+from mapfilter.workflows.replays import baseline
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -280,6 +300,60 @@ LEARN = (
     f"{share(cell_evidence.PRIOR['rotated'])} for a rotation",
 )
 
+IMU = (
+    f"{number(gyroscope.RATE_SD_RADPS * 180 / pi)} deg/s) shows",
+    f"a random walk of {degrees(gyroscope.WALK_RAD_PER_SQRT_S):.2f} deg/√s",
+    f"up to {number(round(degrees(gyroscope.UNSEEN_SD_RADPS), 6))} deg/s are stated for it",
+    f"to {number(signals.RATE_HZ)} Hz by means",
+    f"an accelerometer with {number(signals._SLOWEST_HZ)} Hz and more",
+    f"a gap of the sensors of more than {signals._LONGEST_GAP_S:g} s",
+    f"between {steps.BAND_HZ[0]:g} and {steps.BAND_HZ[1]:g} Hz, of {steps._PROMINENCE_MPS2:g} m/s² "
+    f"and of {steps._LEAST_SHARE:g} of its neighbours",
+    f"Its length is {pdr_options.STEP_FACTOR:g} times",
+    f"whose size is {share(heading._SIZE_SHARE)}, or whose dip is "
+    f"{number(round(degrees(heading._DIP_RAD), 6))}° off",
+    f"more than {number(walk._DRIVING_MPS)} m/s, jolts are no steps",
+    f"at most {height.TREAD_M:g} m long",
+    f"over {carried_bias._LAG_S} s gravity",
+)
+
+ODOMETRY = (
+    f"from {standing_bias._SETTLING_S:g} s after the wheels stop",
+    f"({number(moved._LEAST_GAP_S)} s, and five usual intervals), or its yaw rate for more than "
+    f"{number(turns.LONGEST_S)} s",
+    f"one of {number(vehicle_headings._LASTING_DEG)} degrees that lasts",
+    f"counts of more than {number(odometer_counts._COARSE_M)} m",
+    f"({number(mounted_clock._WITHIN_S)} at most)",
+    f"than {undirected.APART_SD:g} of their deviations, {number(undirected.APART_M)} m at most",
+    f"a floor of {standing_bias._UNSEEN_BIAS_DEG_PER_S:g}°/s",
+    f"at more than {number(vehicle_signs._PERSON_MPS)} m/s for a tenth of the time",
+    f"by more than {degrees(vehicle_signs._STEADY_RADPS):.1f} deg/s from one half second",
+    f"at no more than {number(vehicle_signs._MOTOR_MPS)} m/s and with at most two gains of "
+    f"{number(vehicle_signs._GAIN_MPS)} m/s in {number(vehicle_signs._GAIN_S)} s",
+    f"below {MAP_RULES.converge_log_odds:g} for {number(BY_MAP.switch_hold_m)} m",
+)
+
+SINGLE = (
+    f"The weighted mean place of the {single.Neighbours().k} reports",
+    f"exponent {single.Neighbours().exponent:g})",
+    f"at most {baseline.MOST_REPORTS} reports are located",
+    f"and {baseline.CALIBRATED_WITH} calibrate the regions",
+    f"adds {number(planned.OWN_DB['eirp_dbm'])} dB to the error of each cell and "
+    f"{number(planned.COMMON_DB['eirp_dbm'])} dB to that of all, an assumed height "
+    f"{number(planned.OWN_DB['height_m'])} and {number(planned.COMMON_DB['height_m'])} dB, an "
+    f"unknown azimuth {number(planned.OWN_DB['azimuth_deg'])} dB",
+    f"off boresight {planned.PATTERN_SHARE:g} of the predicted attenuation",
+    f"``database.floor_dbm``, unless it is set, is −{-floor.FLOORS_DBM['LTE']:g} dBm",
+    f"By default {SITES.fix_lasting_share:g} of each fix's own variance lasts for "
+    f"{number(SITES.fix_lasting_s)} s",
+)
+
+REPLAYS = (
+    f"squares of {trace._STEPS_M[0]:g} m where it has converged, up to {trace._STEPS_M[-1]:g} m",
+    f"at most {number(trace.MOST_FRAMES)} and {number(trace.MOST_EXPLAINED)} are kept",
+    f"in steps of {ground.LEVEL_DB:g} dB",
+)
+
 CALIBRATION = (f"(percentile bootstrap, {intervals._DRAWS} draws)",)
 PROTECTION = (
     f"({number(stanford.IntegrityOptions().alert_limit_m)} m unless you set",
@@ -298,7 +372,11 @@ PAGES = {
     "explanation/satellites-on-the-map": SATELLITES,
     "explanation/scale": SCALE,
     "file-formats": FILES,
+    "howto/odometry": ODOMETRY,
+    "howto/raw-imu": IMU,
+    "howto/see-a-replay": REPLAYS,
     "howto/serve": SERVE,
+    "howto/single-reports": SINGLE,
     "tutorial/learn": LEARN,
 }
 
