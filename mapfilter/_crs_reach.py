@@ -57,6 +57,22 @@ def project_within(
     return east_m, north_m, beyond | np.isin(square, absurd) if absurd else beyond
 
 
+def ground_m(crs: str, lon_deg: float, lat_deg: float, length_m: float = 100.0) -> float:
+    """Return how long a length of a CRS is on the ground, where that differs most.
+
+    Examples
+    --------
+    >>> [f"{ground_m(crs, 25.0, 60.0):.0f}" for crs in ("EPSG:32635", "EPSG:3857")]
+    ['100', '50']
+    """
+    return length_m / max(_scales(crs, lon_deg, lat_deg), key=lambda scale: abs(scale - 1))
+
+
+def is_on_the_ground(crs: str, lon_deg: float, lat_deg: float) -> bool:
+    """Return whether metres of a CRS are metres on the ground at a place, within 5 %."""
+    return _is_true_to_scale(crs, lon_deg, lat_deg, _SCALE_TOLERANCE)
+
+
 def likely_mistake(crs: str, lon_deg: float, lat_deg: float) -> str:
     """Return the likely mistake of a place beyond a CRS: what puts it there, else the zone there.
 
@@ -110,6 +126,10 @@ def _is_absurd(crs: str, west_deg: int, south_deg: int) -> bool:
 
 
 def _is_true_to_scale(crs: str, lon_deg: float, lat_deg: float, tolerance: float) -> bool:
+    return all(abs(scale - 1) <= tolerance for scale in _scales(crs, lon_deg, lat_deg))
+
+
+def _scales(crs: str, lon_deg: float, lat_deg: float) -> tuple[float, float]:
+    """Return the scales along the meridian and the parallel."""
     factors = projection(crs).get_factors(lon_deg, lat_deg)
-    scales = np.array([factors.meridional_scale, factors.parallel_scale])
-    return bool(np.all(np.abs(scales - 1) <= tolerance))
+    return float(factors.meridional_scale), float(factors.parallel_scale)

@@ -33,7 +33,7 @@ class VehicleSigns:
         How often speed grows by 4 m/s or more within 3 s, as motors do and cyclists do not.
     sway_radps : float
         How much the yaw rate of half a second usually differs from the mean of those before and
-        after it, at more than 3 m/s: 0.4 to 0.9 deg/s in the cars of smartLoc and KITTI; bicycles
+        after it, at more than 3 m/s: 0.3 to 0.9 deg/s in the cars of smartLoc and KITTI; bicycles
         steer to stay upright, about once a second. NaN where intervals are longer.
     sharpest_rad : float
         The largest turn within 5 m. Cars turn on circles of 4 m and more, by 70 degrees or so.

@@ -194,9 +194,9 @@ def make_log(
     InputError
         With every fault: NaN or infinity in times or coordinates, text for numbers, values out of
         their range, columns missing or misspelt, milliseconds for seconds, degrees for metres or
-        for radians, steps that are none, raw RXLEV for dBm, a CRS that is not projected, tables
-        that do not overlap in time, a start outside the years 1 to 9999, an almanac of another
-        time, or one without a start.
+        for radians, steps that are none, raw RXLEV for dBm, a CRS that is not projected, or whose
+        metres are none on the ground at positions in degrees, tables that do not overlap in time, a
+        start outside the years 1 to 9999, an almanac of another time, or one without a start.
     ConfigError
         An argument that is no table is of another type.
 

@@ -1,19 +1,17 @@
 """Numbers that pages state are those of the program: each text is made of its constants."""
 
 from math import degrees
-from pathlib import Path
 
 import numpy as np
 import pytest
+from told_numbers import e_to, number, share, told
 
-from mapfilter.check import datum_shift, identity_checks, level_law, lobes
-from mapfilter.database import build, checked, estimate, floor, parts, tiles
+from mapfilter.database import build, estimate, parts, tiles
 from mapfilter.evaluation import first_fix, intervals, map_bound, radio_map, stanford
-from mapfilter.learning import cell_evidence, likelihood, network, visits
 from mapfilter.models import level_errors, street_motion, way_course, way_spread
 from mapfilter.models.level_memory import SLOTS, LevelMemory
 from mapfilter.models.street_motion import STATES
-from mapfilter.positioning import epochs, integrity, known_start
+from mapfilter.positioning import integrity
 from mapfilter.positioning.bayes import assembly, carriageways, options
 from mapfilter.positioning.bayes.area import area_frame, area_tiles, opened_area, tiled_area
 from mapfilter.positioning.bayes.beliefs import belief_filters, first_hypotheses, path
@@ -31,11 +29,7 @@ from mapfilter.positioning.sensors import (
     undirected,
     unheard,
 )
-from mapfilter.serving import epoch_rows, events, limits
-from mapfilter.tracks.checks import log_checks, motion_faults
-
-ROOT = Path(__file__).resolve().parents[2]
-DOCS = ROOT / "docs"
+from mapfilter.serving import limits
 
 BAYES, RULES, MIRROR = options.BayesFilter(), alternative.AlternativeRules(), mirrored.MirrorRules()
 HOLDS, PULLS, GNSS = hold_rules.HoldRules(), hold_rules.PullRules(), gnss_options.GnssOptions()
@@ -44,22 +38,6 @@ SITES, SERVICE = models.KalmanOptions(), limits.ServiceLimits()
 KNOWN = assembly._particle_options(BAYES)
 BY_MAP, MAP_RULES = assembly._by_map_alone(KNOWN, RULES)
 WORDS = {8: "eight", 10: "ten"}
-
-
-def number(value: float) -> str:
-    """Return a number as pages write it, with blanks between thousands."""
-    return f"{value:,.10g}".replace(",", " ")
-
-
-def share(value: float) -> str:
-    """Return a share in per cent."""
-    return f"{100 * value:.10g} %"
-
-
-def e_to(log_odds: float) -> str:
-    """Return odds as pages write them."""
-    power = f"{log_odds:g}"
-    return f":math:`e^{{{power}}}`" if len(power) > 1 else f":math:`e^{power}`"
 
 
 FILTER = (
@@ -236,50 +214,6 @@ SCALE = (
     f"more than {tiled_area.SEARCH_TILES // 2} of these",
 )
 
-SERVE = (
-    f"one or up to {epoch_rows.MOST_EPOCHS} at a time",
-    f"of up to {epoch_rows._MOST_ROWS} rows each",
-    f"A start more than {number(known_start.START_REACH_M)} m",
-    f"up to the last {events.KEPT_FIXES} fixes",
-    f"At most {SERVICE.watched} sessions are watched",
-    f"not sent within {number(SERVICE.receive_s)} s",
-)
-
-COMMANDS = (
-    f"sessions ({SERVICE.sessions}), minutes after which an unused one ends "
-    f"({number(SERVICE.idle_s / 60)}), memory for states ({SERVICE.state_bytes >> 20} MiB), "
-    f"largest body ({SERVICE.body_bytes >> 10}), epochs and requests a second of one address "
-    f"({number(SERVICE.rate_per_s)})",
-    f"up to {number(identity_checks._NEAR_M / 1000)} km away",
-    f"pixels of at most {number(datum_shift._WIDEST_PX_M)} m are needed",
-    f"more than {number(lobes._FAR_OFF_DEG)}° off the lobe",
-    f"from {number(level_law._FROM_M)} m on",
-    f"more than {number(level_law._STEEPEST_DB)} dB per tenfold distance and are everywhere more "
-    f"than {number(level_law._STEEP_BELOW_DB)} dB below",
-    f"more than {number(level_law._STEEP_DB)} dB and {number(level_law._FAR_BELOW_DB)} dB, or "
-    f"{number(-level_law._ABOVE_DB)} dB above free space",
-)
-
-FILES = (
-    f"less than {motion_faults._SHORTER:g} or more than {motion_faults._LONGER:g} times as long",
-    f"faster than {number(log_checks._FASTEST_MPS)} m/s in the median",
-    f"a deviation of {number(epochs.FIX_SD_M)} m is assumed",
-    f"(−{-floor.FLOORS_DBM['UMTS']:g} dBm with UMTS cells, −{-floor.FLOORS_DBM['LTE']:g} dBm with",
-    f"each {checked.BLOCK_BYTES >> 10} KiB",
-)
-
-LEARN = (
-    f"in one square of {number(visits.SQUARE_M)} m are one *visit*",
-    f"``n / (1 + {likelihood._AGAIN:g} (n - 1))``",
-    f"within {number(visits.LARGEST_RADIUS_M)} m, or levels",
-    f"steps of {cell_evidence.TURNS_DEG[0]:g}°",
-    f"a probability of {network._SURE:g} or more",
-    f"The priors are {share(cell_evidence.PRIOR['offset'])} for an offset (deviation "
-    f"{number(likelihood.LevelNoise().fault_sd_db)} dB; of sound cells "
-    f"{number(likelihood.LevelNoise().cells_sd_db)} dB",
-    f"{share(cell_evidence.PRIOR['rotated'])} for a rotation",
-)
-
 CALIBRATION = (f"(percentile bootstrap, {intervals._DRAWS} draws)",)
 PROTECTION = (
     f"({number(stanford.IntegrityOptions().alert_limit_m)} m unless you set",
@@ -288,7 +222,6 @@ PROTECTION = (
 )
 
 PAGES = {
-    "cli": COMMANDS,
     "explanation/bayes-faults": FAULTS,
     "explanation/bayes-filter": FILTER,
     "explanation/bound": BOUND,
@@ -297,14 +230,7 @@ PAGES = {
     "explanation/protection-levels": PROTECTION,
     "explanation/satellites-on-the-map": SATELLITES,
     "explanation/scale": SCALE,
-    "file-formats": FILES,
-    "howto/serve": SERVE,
-    "tutorial/learn": LEARN,
 }
-
-
-def told(page: str) -> str:
-    return " ".join((DOCS / f"{page}.rst").read_text(encoding="utf-8").split())
 
 
 @pytest.mark.parametrize("page", PAGES)

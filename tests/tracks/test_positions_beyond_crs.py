@@ -57,6 +57,29 @@ def test_a_crs_of_another_region_is_refused_with_the_zone_of_the_place(tmp_path)
     assert hint in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    ("crs", "ground_m"), [("EPSG:3857", "50"), ("EPSG:3395", "50"), ("EPSG:6933", "57")]
+)
+def test_metres_of_the_world_are_none_on_the_ground(tmp_path, crs, ground_m):
+    """A filter without a map would go on by steps that are half as long as the positions' way."""
+    told = f": expected positions at which metres of {crs} are metres on the ground, found 60.2, 25"
+    hint = "Web Mercator or another CRS of the world; at that place it is EPSG:32635"
+    for where, made in (
+        ("walk.csv", lambda: mf.read_log(recording(tmp_path, LON_DEG), crs=crs)),
+        ("gnss", lambda: mf.make_log(crs, gnss=table(LON_DEG))),
+        ("truth", lambda: mf.make_log(crs, truth=table(LON_DEG))),
+    ):
+        with pytest.raises(mf.MapfilterError) as refused:
+            made()
+        assert f"{where}{told}" in str(refused.value)
+        assert f"where 100 m are {ground_m} m (likely: {hint})" in str(refused.value)
+
+
+def test_metres_of_the_world_are_right_at_the_equator():
+    log = mf.make_log("EPSG:3857", gnss=table(LON_DEG).assign(lat_deg=5.0))
+    assert (len(log.gnss), log.notes) == (30, ())
+
+
 def test_a_compound_crs_is_that_of_its_horizontal_part(tmp_path):
     log = mf.read_log(recording(tmp_path, LON_DEG), crs="EPSG:3067+3900")
     assert log.crs == "EPSG:3067"

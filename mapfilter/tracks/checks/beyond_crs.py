@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from mapfilter._crs_reach import likely_mistake, project_within
+from mapfilter._crs_reach import ground_m, is_on_the_ground, likely_mistake, project_within
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import short_crs, unproject
+from mapfilter.geodesy import short_crs, unproject, utm_crs
 from mapfilter.tracks.readers.recorded.recording import Recording
 
 _OF_PLACES = ("positions", "truth", "places", "true_places")
@@ -28,7 +28,8 @@ def without_beyond(
 ) -> str:
     """Return the note on positions beyond a CRS that are left out, "" without any.
 
-    All of them are a fault: wrong degrees, or a CRS of another region.
+    All of them are a fault: wrong degrees, or a CRS of another region. So are positions at which
+    its metres are none on the ground, as those of Web Mercator: steps would not fit them.
 
     Parameters
     ----------
@@ -39,6 +40,8 @@ def without_beyond(
     row_numbers : (N,) array of int, optional
         Of the rows of a table; without them positions are counted.
     """
+    if not beyond.all():
+        _check_ground(where, crs, float(lon_deg[~beyond][0]), float(lat_deg[~beyond][0]), faults)
     if not beyond.any():
         return ""
     row, count = int(np.argmax(beyond)), int(beyond.sum())
@@ -51,6 +54,17 @@ def without_beyond(
         return ""
     some = number_of(count, "position")
     return f"{where}: {some} left out: {short_crs(crs)} has no such places; first {found}"
+
+
+def _check_ground(where: str, crs: str, lon_deg: float, lat_deg: float, faults: Faults) -> None:
+    if is_on_the_ground(crs, lon_deg, lat_deg):
+        return
+    name, own = short_crs(crs), f"{lat_deg:.6g}, {lon_deg:.6g}"
+    expected = f"positions at which metres of {name} are metres on the ground"
+    found = f"{own}, where 100 m are {ground_m(crs, lon_deg, lat_deg):.0f} m"
+    zone = utm_crs((lon_deg + 180) % 360 - 180, lat_deg)
+    hint = f"Web Mercator or another CRS of the world; at that place it is {zone}"
+    faults.add(where, expected, found, hint)
 
 
 def within_crs(
