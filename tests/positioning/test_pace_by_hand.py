@@ -158,3 +158,18 @@ def test_after_a_pause_a_row_covers_three_usual_intervals(rows, least_m):
 
 def test_rows_without_any_time_have_no_speed():
     assert after(Pace(1.0, 1.0, rows=2), 1.0, 5.0).fastest_mps == 0.0
+
+
+def test_rows_come_at_rest_as_often_as_the_last_two_intervals_say():
+    """The shorter one counts: a recording may have paused for the other. Steps change nothing."""
+    pace = Pace(motion_s=0.0, stepped_s=0.0, rows=50, interval_s=1.0)
+    found = []
+    for time_s in (9.0, 19.0, 29.0, 89.0, 149.0):
+        pace = after(pace, time_s, 0.0)
+        found.append(pace.at_rest_s)
+    assert found == [0.0, 0.0, 10.0, 10.0, 60.0]
+    walked = after(pace, 150.0, 1.4)
+    assert after(walked, 190.0, 0.0).at_rest_s == 60.0
+    # A row without a length tells of no rest, and one at the same time of no interval.
+    assert after(pace, 152.0, nan).at_rest_s == 60.0
+    assert after(pace, 149.0, 0.0).at_rest_s == 60.0

@@ -8,7 +8,7 @@ import pytest
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.sensors.pace import Going, Pace
-from mapfilter.positioning.sensors.pauses import RowTimes, unrecorded_s
+from mapfilter.positioning.sensors.pauses import RowTimes, longest_s, unrecorded_s
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.unmeasured import spread_m2
 from mapfilter.positioning.sensors.watch import SensorWatch
@@ -100,6 +100,33 @@ def test_whoever_rests_before_and_after_a_pause_has_rested():
     assert unrecorded_s(ALWAYS, EVERY_2_S, 500.0, rest, 100.0, rested=True) == 0.0
     assert unrecorded_s(ALWAYS, EVERY_2_S, 500.0, rest, 100.0, rested=False) == 399.0
     assert unrecorded_s(ALWAYS, EVERY_2_S, 500.0, STEP, 100.0, rested=True) == 399.0
+
+
+@pytest.mark.parametrize(
+    ("at_rest_s", "speed_mps", "longest"),
+    [(3.0, 1.4, 5.0), (10.0, 1.4, 15.0), (10.0, 2.5, 15.0), (10.0, 2.6, 5.0), (40.0, 1.4, 30.0)],
+)
+def test_rows_of_a_walker_may_come_less_often_at_rest(at_rest_s, speed_mps, longest):
+    """The next one is missing after one and a half intervals, and after 30 s in any case."""
+    pace = replace(ALWAYS, at_rest_s=at_rest_s, speed_mps=speed_mps)
+    assert longest_s(pace) == longest
+    assert longest_s(replace(pace, interval_s=20.0)) == 60.0
+
+
+def test_a_walker_whose_rows_are_rarer_at_rest_stays_where_the_rest_is():
+    """The first rest shows how often they come. Rows that end are missing all the same."""
+    watch, found = SensorWatch(), {}
+    rows = [(float(k), 1.4) for k in range(60)] + [(68.0 + 10 * k, 0.0) for k in range(4)]
+    rows += [(100.0 + k, 1.4) for k in range(60)] + [(168.0 + 10 * k, 0.0) for k in range(4)]
+    rows += [(208.0 + k, 1.4) for k in range(60)]
+    steps = dict(rows)
+    for time_s in sorted({*steps, *(3.0 * k for k in range(100))}):
+        row = (MotionStep(steps[time_s], 0.0),) if time_s in steps else ()
+        watch, _, (why, _) = watched(watch, Epoch(time_s, row, HEARD if time_s % 3 == 0 else ()))
+        found[time_s] = why
+    missing_s = [time_s for time_s, why in found.items() if why is Reason.MOTION_MISSING]
+    assert missing_s[:2] == [66.0, 75.0]
+    assert [time_s for time_s in missing_s if time_s > 90.0] == [285.0, 288.0, 291.0, 294.0, 297.0]
 
 
 def test_a_pedometer_pauses_only_where_reports_do():

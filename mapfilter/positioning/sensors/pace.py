@@ -71,6 +71,8 @@ class Pace:
         Largest speed of a row.
     last_mps : float
         Speed of the last row.
+    rested_s, at_rest_s : float
+        Last interval between two rows of a rest, and the shorter one of the last two; 0 before.
     """
 
     motion_s: float = nan
@@ -83,6 +85,8 @@ class Pace:
     recent_mps: float = _WALK_MPS
     fastest_mps: float = 0.0
     last_mps: float = 0.0
+    rested_s: float = 0.0
+    at_rest_s: float = 0.0
 
     @property
     def reports_always(self) -> bool:
@@ -138,6 +142,9 @@ class Pace:
                 lasted_s = max(lasted_s, covered_s) if covered_s > row_s else lasted_s
                 speed_mps += (gone_m - speed_mps * lasted_s) / (_SPEED_S * max(interval_s, 1.0))
         row_mps = self._row_mps(gone_m, since_s, covered_s)
+        rested_s, at_rest_s = self.rested_s, self.at_rest_s
+        if measured and not goes and self.motion_s != self.stepped_s and since_s > 0:
+            rested_s, at_rest_s = since_s, min(since_s, rested_s)
         pace = Pace(
             time_s,
             time_s if goes else self.stepped_s,
@@ -149,6 +156,8 @@ class Pace:
             recent_mps,
             max(self.fastest_mps, row_mps),
             row_mps,
+            rested_s,
+            at_rest_s,
         )
         return pace, going
 

@@ -10,10 +10,13 @@ from __future__ import annotations
 from math import isfinite, nan
 from typing import NamedTuple
 
-from mapfilter.positioning.sensors.pace import GAP_INTERVALS, Going, Pace
+from mapfilter.positioning.sensors.pace import GAP_INTERVALS, WALKERS_MPS, Going, Pace
 
 GAP_S = 5.0
 """After so long motion rows are missing, if they come at rest, too."""
+_REST_INTERVALS, _LONGEST_REST_S = 1.5, 30.0
+"""Intervals of a walker's rows at rest, which may be longer than on the way, after which the next
+one is missing; the longest time of that: on the way, one walks some 40 m in it."""
 _SILENT_S, _KNOWN_REPORTS = 10.0, 10
 """After so long without a row of any kind a recording has paused; reports by which it is known how
 often they come."""
@@ -64,7 +67,10 @@ class RowTimes(NamedTuple):
 
 def longest_s(pace: Pace) -> float:
     """Return the time after which motion rows are missing, where they come at rest, too."""
-    return max(GAP_S, GAP_INTERVALS * pace.interval_s)
+    usual_s = max(GAP_S, GAP_INTERVALS * pace.interval_s)
+    if pace.speed_mps > WALKERS_MPS:
+        return usual_s
+    return max(usual_s, min(_REST_INTERVALS * pace.at_rest_s, _LONGEST_REST_S))
 
 
 def unrecorded_s(
