@@ -1,6 +1,9 @@
 """Headings that jump in a walk: the walker has turned, or the phone was turned or mirrored."""
 
+from copy import deepcopy
 from dataclasses import replace
+from functools import cache
+from itertools import islice
 from math import isnan
 from types import SimpleNamespace
 
@@ -63,33 +66,54 @@ def mirrored(heading):
     return 2.2 - heading
 
 
-def followed(positioner, log, seed):
-    """Follow a log from its known start: errors, whether claimed, reasons, and all states."""
+def begun_walk(positioner, log, seed):
+    """The state at the known start of a log, and a generator."""
     rng = np.random.default_rng(seed)
-    truth = {name: log.truth[name].to_numpy() for name in ("time_s", "east_m", "north_m")}
-    state = positioner.begin_at(truth["east_m"][0], truth["north_m"][0], 5.0, rng)
-    off_m, claimed, reasons, states = [], [], [], []
+    return positioner.begin_at(log.truth["east_m"][0], log.truth["north_m"][0], 5.0, rng), rng
+
+
+def rows_of(positioner, log, state, rng, from_s=-np.inf, until_s=np.inf):
+    """Errors, whether claimed, reasons, and whether other beliefs are held; and the state."""
+    rows = []
     for epoch in epochs(log):
+        if not from_s < epoch.time_s <= until_s:
+            continue
         state, output = positioner.step(state, epoch, rng)
-        fix = output.fix
-        off_m.append(error_m(log, fix))
-        claimed.append(fix.status in (Status.CONVERGED, Status.TRACKING))
-        reasons.append({one.reason for one in output.unused if one.kind == "motion"})
-        states.append(state)
-    return np.array(off_m), np.array(claimed), reasons, states
+        claimed = output.fix.status in (Status.CONVERGED, Status.TRACKING)
+        reasons = {one.reason for one in output.unused if one.kind == "motion"}
+        rows.append((error_m(log, output.fix), claimed, reasons, bool(state.held)))
+    return rows, state
+
+
+@cache
+def first_half(watched, seed):
+    """Until headings are changed all of these walks are the same."""
+    positioner, log = WATCHED if watched else UNWATCHED, log_of(seed)
+    state, rng = begun_walk(positioner, log, seed)
+    return *rows_of(positioner, log, state, rng, until_s=TURNED_S), rng
+
+
+@cache
+def followed(watched, seed, change=None):
+    """Follow a walk from its known start: what is found at each epoch, and the last state."""
+    rows, state, rng = first_half(watched, seed)
+    positioner, log = WATCHED if watched else UNWATCHED, log_of(seed, change)
+    later, state = rows_of(positioner, log, state, deepcopy(rng), from_s=TURNED_S)
+    off_m, claimed, reasons, held = zip(*rows, *later, strict=True)
+    return np.array(off_m), np.array(claimed), reasons, held, state
 
 
 @pytest.mark.parametrize("change", [reversed_, mirrored])
 def test_a_turned_phone_is_noticed_and_its_headings_are_read_otherwise(change):
     wrong, ends = {}, {}
-    for positioner in (WATCHED, UNWATCHED):
-        name, found = positioner.holds.watched, []
+    for watched in (True, False):
+        found = []
         for seed in SEEDS:
-            off_m, claimed, reasons, states = followed(positioner, log_of(seed, change), seed)
+            off_m, claimed, reasons, _, state = followed(watched, seed, change)
             found.append((np.mean(claimed & (off_m > 50)), np.median(off_m[-60:]) < 30))
-            if name and states[-1].hold != Hold():
+            if watched and state.hold != Hold():
                 assert any(Reason.PHONE_TURNED in one for one in reasons)
-        wrong[name], ends[name] = np.mean(found, axis=0)
+        wrong[watched], ends[watched] = np.mean(found, axis=0)
     assert wrong[True] < 0.75 * wrong[False]
     assert ends[True] > ends[False] + 0.3
 
@@ -98,19 +122,18 @@ def test_walks_whose_headings_do_not_jump_are_the_same_to_the_bit():
     """The town's corners, of 90° between rows short enough, are below the least jump."""
     log = log_of(3)
     watched = replace(WATCHED, holds=replace(WATCHED.holds, jump_deg=140.0))
-    found, other = (followed(one, log, 3)[3] for one in (watched, UNWATCHED))
-    assert found[-1].belief.state.tobytes() == other[-1].belief.state.tobytes()
-    assert all(one.held == () for one in found)
+    rows, state = rows_of(watched, log, *begun_walk(watched, log, 3))
+    assert state.belief.state.tobytes() == followed(False, 3)[-1].belief.state.tobytes()
+    assert not any(row[3] for row in rows)
 
 
 def test_walkers_who_turn_are_followed_as_before():
     """Beliefs with a turned phone have draws of their own, and do not take over."""
     for seed in (1, 2, 3):
-        log = log_of(seed)
-        off_m, claimed, _, states = followed(WATCHED, log, seed)
-        plain = followed(UNWATCHED, log, seed)
-        assert any(one.held for one in states)
-        assert states[-1].hold == Hold()
+        off_m, claimed, _, held, state = followed(True, seed)
+        plain = followed(False, seed)
+        assert any(held)
+        assert state.hold == Hold()
         assert np.array_equal(off_m, plain[0])
         assert claimed.mean() > plain[1].mean() - 0.05
 
@@ -378,16 +401,20 @@ def test_beliefs_that_a_reading_leaves_no_hypothesis_of_are_dropped():
 
 def test_a_state_with_such_beliefs_can_be_saved_and_goes_on():
     log = log_of(1, reversed_)
-    _, _, _, states = followed(WATCHED, log, 1)
-    at = next(k for k, one in enumerate(states) if one.held)
-    held = states[at]
+    held, rng = begun_walk(WATCHED, log, 1)
+    rest = iter(epochs(log))
+    for epoch in rest:
+        held, _ = WATCHED.step(held, epoch, rng)
+        if held.held:
+            break
+    rows = list(islice(rest, 5))
     again = decode(encode({"state": held}), "made")["state"]
     assert [one.hold for one in again.held] == [one.hold for one in held.held]
     assert encode({"state": again}) == encode({"state": held})
     ends = []
     for state in (held, again):
         rng, now = np.random.default_rng(9), state
-        for epoch in list(epochs(log))[at + 1 : at + 6]:
+        for epoch in rows:
             now, _ = WATCHED.step(now, epoch, rng)
         ends.append(now)
     assert ends[0].held
