@@ -1,5 +1,6 @@
 """Positions that lead away slowly: a belief without them tells, by hand and in a made town."""
 
+from copy import deepcopy
 from dataclasses import replace
 from functools import cache
 from math import nan
@@ -34,12 +35,14 @@ from mapfilter.positioning.bayes.rivals.unaided import beside_alternative
 from mapfilter.positioning.bayes.sources.evidence import EvidenceUpdate, FixedTerm, RadioReading
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch, GnssFix, Pseudorange
+from mapfilter.positioning.estimate_columns import EstimateColumns
 from mapfilter.positioning.gnss.fixes import agrees_with
 from mapfilter.positioning.gnss.gate import GnssComparison, GnssGate, _neutral
 from mapfilter.positioning.gnss.options import GnssOptions
 from mapfilter.positioning.gnss.source import GnssSource
 from mapfilter.positioning.gnss.state import GnssState
-from mapfilter.positioning.loop import locate
+from mapfilter.positioning.loop import kinds_of, locate
+from mapfilter.positioning.merging import epochs
 from mapfilter.positioning.step_output import UnusedReading
 from mapfilter.tracks.log import make_log
 
@@ -315,12 +318,13 @@ TOWN = Town.of(1)
 FILTER = BayesFilter().over_area(TOWN.area())
 TRUSTING = replace(FILTER, pulls=PullRules(watched=False))
 WALKS = range(3)
+LED_S = 80.0
 
 
 def walk(seed, away_per_m):
     log, rng = walk_log(TOWN, seed, 1500.0), np.random.default_rng((seed, 9))
     truth, toward = log.truth, rng.uniform(0, 2 * np.pi)
-    away_m = np.clip((truth["time_s"] - 80) * 5 * away_per_m, 0, 250)
+    away_m = np.clip((truth["time_s"] - LED_S) * 5 * away_per_m, 0, 250)
     places = {
         name: truth[name] + away_m * part + rng.normal(0, 3, len(truth))
         for name, part in (("east_m", np.cos(toward)), ("north_m", np.sin(toward)))
@@ -331,11 +335,28 @@ def walk(seed, away_per_m):
 
 
 @cache
+def begun(seed, trusting):
+    """The state, the generator and the outputs up to where positions are led away, if they are."""
+    log, filter_ = walk(seed, 0.0), TRUSTING if trusting else FILTER
+    state, rng, columns = filter_.begin(kinds_of(log)), np.random.default_rng(5), EstimateColumns()
+    for epoch in epochs(log):
+        if epoch.time_s <= LED_S:
+            state, output = filter_.step(state, epoch, rng)
+            columns.add(output)
+    return state, rng, columns
+
+
+@cache
 def located(seed, away_per_m, *, trusting=False):
     """Return the estimate, its errors, and which of its positions are claimed."""
-    log = walk(seed, away_per_m)
-    filter_ = TRUSTING if trusting else FILTER
-    found = locate(log, filter_, np.random.default_rng(5)).estimate
+    log, filter_ = walk(seed, away_per_m), TRUSTING if trusting else FILTER
+    state, *changing = begun(seed, trusting)
+    rng, columns = deepcopy(changing)
+    for epoch in epochs(log):
+        if epoch.time_s > LED_S:
+            state, output = filter_.step(state, epoch, rng)
+            columns.add(output)
+    found = columns.estimate(CRS, filter_.name)
     error_m = np.hypot(
         found.east_m - log.truth["east_m"].to_numpy(),
         found.north_m - log.truth["north_m"].to_numpy(),
@@ -353,7 +374,7 @@ def test_positions_that_lead_away_are_hardly_ever_followed(away_per_m):
             wrong[trusting] += int((claimed & (error_m > 50)).sum())
         rejecting += Reason.REJECTED_BY_EVIDENCE in {one.reason for one in found.unused}
         # Where positions are more than 50 m off.
-        led = np.arange(len(error_m)) > 80 + 10 / away_per_m
+        led = np.arange(len(error_m)) > LED_S + 10 / away_per_m
         right += int((claimed & (error_m <= 50) & led).sum())
     # Where they are believed less than they ask for none may be rejected.
     assert rejecting >= 2
