@@ -8,7 +8,7 @@ from mapfilter.errors import InputError
 from mapfilter.lattice import Lattice
 from mapfilter.rasters.ascii_grids import open_ascii_grid
 from mapfilter.rasters.files import Declared, check_plausible, without_nodata
-from mapfilter.rasters.opening import open_rasters
+from mapfilter.rasters.opening import _listed, open_rasters
 from mapfilter.rasters.plain_grids import GridHeader
 
 CRS = "EPSG:32635"
@@ -239,3 +239,16 @@ def test_raw_pixels_may_lack_the_padding_of_the_last_row_and_no_more(tmp_path):
         else:
             with pytest.raises(InputError, match="120 bytes for 6 rows of 20"):
                 open_rasters(path, "loss", crs=CRS)
+
+
+@pytest.mark.parametrize("count", [100_000, 100_001])
+def test_a_folder_holds_100_000_rasters_at_most(tmp_path, monkeypatch, count):
+    path = tmp_path / "a.asc"
+    # As many files take minutes to write: one of them stands for all.
+    monkeypatch.setattr(type(tmp_path), "iterdir", lambda _: iter([path] * count))
+    monkeypatch.setattr("mapfilter.rasters.opening._is_raster", lambda _: True)
+    if count > 100_000:
+        with pytest.raises(InputError, match="expected at most 100000 rasters, found 100001"):
+            _listed(tmp_path)
+    else:
+        assert len(_listed(tmp_path)) == count

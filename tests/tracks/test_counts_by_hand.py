@@ -45,7 +45,7 @@ def test_batches_are_spread_over_the_rows_before(time_s, counted, expected, batc
     [
         ([0, 1, 4], [0, 2, 6], range(5), [0, 1, 2, 3, 4], [0, 2, 2, 2, 2]),
         # Longer than 2.5 s, into the fewest parts of a second at most.
-        ([0, 2.5], [0, 3], range(5), [0, 2.5], [0, 3]),
+        ([0, 2.5], [0, 3], [0.5, 1.5, 2.5], [0, 2.5], [0, 3]),
         ([0, 2.6], [0, 3], [0.8, 1.7, 2.6], [0, 2.6 / 3, 5.2 / 3, 2.6], [0, 1, 1, 1]),
         # With a direction in each, up to its end.
         ([0, 3], [0, 3], [1, 2, 3], [0, 1, 2, 3], [0, 1, 1, 1]),
