@@ -11,11 +11,25 @@ from mapfilter.radio.asu import LARGEST_LOSS_DB, LOST_SIGN
 from mapfilter.radio.rxlev import LARGEST_RXLEV
 
 LEVELS_EXPECTED = "levels in dBm, such as RSRP in -140..-44 or RxLev in -110..-47"
+TENTHS = "tenths of a dB (-780 for -78 dBm); divide by 10"
+"""The likely mistake behind levels far below all that are received."""
 QUALITY = "a quality in dB, such as RSRQ (-20 to -3)"
 
+_LEAST_DBM, _LEAST_TENTHS = -200.0, -2000.0
 _BEST_DB, _WORST_DB = 0.0, -30.0
 _SHARE, _FEWEST = 0.9, 10
 _RXLEV, _OFFSET = "raw RXLEV given for dBm", "a strong level plus an offset"
+
+
+def are_tenths(low: float, high: float) -> bool:
+    """Return whether numbers between two, all too low for dBm, are levels in tenths of a dB.
+
+    Examples
+    --------
+    >>> are_tenths(-1086.0, -694.0), are_tenths(-9999.0, -694.0), are_tenths(-1086.0, 70.0)
+    (True, False, False)
+    """
+    return low >= _LEAST_TENTHS and high < _LEAST_DBM
 
 
 def likely_of_positive(levels: Floats) -> str:

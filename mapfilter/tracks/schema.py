@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from mapfilter._types import Floats
 from mapfilter.radio.identities import NEIGHBOUR as NEIGHBOUR
 from mapfilter.radio.identities import SERVING as SERVING
-from mapfilter.radio.level_quantity import likely_of_positive
+from mapfilter.radio.level_quantity import TENTHS, are_tenths, likely_of_positive
 
 Kind = Literal["motion", "serving", "neighbour", "gnss", "pseudorange", "tdoa"]
 """Kinds of measurements that a log may hold, each in one table of :data:`TABLES`."""
@@ -95,7 +95,10 @@ class Table:
 
 
 def _level_mistake(levels: Floats) -> str:
-    return likely_of_positive(levels) if (levels > 0).any() else ""
+    if (levels > 0).any():
+        return likely_of_positive(levels)
+    known = levels[np.isfinite(levels)]
+    return TENTHS if known.size and are_tenths(known.min(), known.max()) else ""
 
 
 def _text(name: str, expected: str, *, required: bool = False) -> Column:

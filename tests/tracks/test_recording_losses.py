@@ -9,6 +9,7 @@ import mapfilter as mf
 from mapfilter.angles import azimuth_from_heading_deg
 from mapfilter.errors import InputError
 from mapfilter.geodesy import unproject
+from mapfilter.radio.level_quantity import TENTHS
 from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.readers.texts import text
 
@@ -182,6 +183,18 @@ def opencellid(change):
     for number, line in enumerate(lines):
         line[at] = str(change(number, int(line[at])))
     return "\n".join([head, *(",".join(line) for line in lines)]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("largest", "likely"), [(-694, True), (-2000, True), (-201, True), (-2001, False)]
+)
+def test_levels_in_tenths_are_told(tmp_path, largest, likely):
+    path = tmp_path / "walk.csv"
+    rows = "".join(f"{k},{largest if k else -780},A\n" for k in range(9))
+    path.write_text(f"time_s,level_dbm,cell\n{rows}")
+    with pytest.raises(InputError, match=r"expected dBm in -200\.\.0") as caught:
+        read_recording(path)
+    assert str(caught.value).endswith(f"(likely: {TENTHS})") == likely
 
 
 def test_levels_above_the_largest_asu_have_lost_their_sign(tmp_path):

@@ -150,6 +150,13 @@ def test_a_header_states_that_times_are_utc(tmp_path, header):
     assert found.tables["positions"]["time_s"].iloc[0] == pytest.approx(1777622400.0, abs=1e-6)
 
 
+@pytest.mark.parametrize("header", ["Cell name", "CellName", "cell_name"])
+def test_a_column_of_names_of_cells_is_suggested_where_no_other_one_tells_them(tmp_path, header):
+    cells = {"time": TIME_S, "rsrp": -80.0, header: "A1"}
+    assert read(tmp_path, cells).unread == (f"{header.lower()} (cell?)",)
+    assert read(tmp_path, {**cells, "ci": 7}).unread == (header.lower(),)
+
+
 def test_a_file_without_anything_that_is_known_is_refused(tmp_path):
     with pytest.raises(InputError):
         read(tmp_path, {"time": TIME_S, "velocity": 1.0})

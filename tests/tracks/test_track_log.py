@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import projected_crs
+from mapfilter.radio.level_quantity import TENTHS
 from mapfilter.tracks.checks.placeless import is_local_frame
 from mapfilter.tracks.log import make_log
 
@@ -134,6 +135,11 @@ def test_all_faults_of_all_tables_are_told_together():
         "(likely: milliseconds for s)",
     ):
         assert part in message
+
+
+def test_levels_in_tenths_are_told():
+    levels = {"time_s": [0.0, 1.0], "role": "serving", "cell": "A", "level_dbm": [-780.0, -1012.0]}
+    assert f"found -780.0 (likely: {TENTHS})" in faults_of(radio=pd.DataFrame(levels))
 
 
 def long_motion(heading_rad):

@@ -87,6 +87,7 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
 """Words for the quantity of a field, in any order; times of the first of several columns."""
 
 _ALSO_MEANT: Mapping[str, tuple[str, ...]] = {
+    "cell": ("cell name", "cellname", "serving cell name", "transmitter"),
     "odometer_m": (
         *("distance", "trip distance", "total distance", "distance travelled", "trip"),
         *("distance traveled", "travelled distance", "traveled distance", "cumulative distance"),
@@ -95,6 +96,8 @@ _ALSO_MEANT: Mapping[str, tuple[str, ...]] = {
 """Words that may mean a quantity, which only a user knows."""
 _UNITLESS = ("time", "steps")
 """Fields without a unit, or whose unit is found by their values."""
+_IDENTITIES = {"ci", "cgi", "enodeb", "arfcn"}
+"""Fields beside which a name of a cell is not needed."""
 _OF_PLACES = ("altitude_m", "accuracy_m", "hdop")
 """Fields that are of use beside positions only."""
 _COMPASS_UNITS = ("deg", "gon")
@@ -193,6 +196,8 @@ def likely_fields(column: str, taken: Collection[str]) -> list[str]:
     """
     useless = () if {"lat_deg", "lon_deg"} <= set(taken) else _OF_PLACES
     held = {*taken, *useless}
+    if held & _IDENTITIES:
+        held.add("cell")
     if stated := [field for field in fields_meant(column) if field not in held]:
         return stated
     near = "" if "[" in column or "(" in column else meant(column, held)

@@ -11,7 +11,13 @@ import numpy as np
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, Signs
-from mapfilter.radio.level_quantity import LEVELS_EXPECTED, QUALITY, LevelCounts
+from mapfilter.radio.level_quantity import (
+    LEVELS_EXPECTED,
+    QUALITY,
+    TENTHS,
+    LevelCounts,
+    are_tenths,
+)
 from mapfilter.tracks.readers.recorded.recorded_field import Field
 from mapfilter.tracks.readers.recorded.wound import Winding
 
@@ -157,6 +163,8 @@ class Tallies:
 
 def _mistake(known: Field, values: _Values) -> str:
     """Return the likely mistake behind values out of range, by the largest of them."""
+    if known.name == "level_dbm" and are_tenths(values.low, values.high):
+        return TENTHS
     most = max(abs(values.low), abs(values.high))
     if known.name == "level_dbm" and (values.high <= 0 or not values.whole):
         # ASU, RXLEV and bars are whole numbers.
