@@ -87,8 +87,8 @@ def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
     ----------
     truth : DataFrame or Truth
         Columns ``time_s``, ``east_m`` and ``north_m``, as the table ``truth`` of a log, in the CRS
-        of the track. As in :func:`mapfilter.make_log`, rows are sorted by time, and exact
-        duplicates dropped.
+        of the track. As in :func:`mapfilter.make_log`, ``time_s`` may be the index, rows are sorted
+        by time, and exact duplicates dropped.
 
     Raises
     ------
@@ -105,6 +105,8 @@ def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
     )
     estimate = track.estimate if isinstance(track, Track) else track
     if not isinstance(truth, Truth):
+        if truth.index.name == "time_s" and "time_s" not in truth:
+            truth = truth.reset_index()
         lacking = {"time_s", "east_m", "north_m"} - set(truth.columns)
         if lacking:
             expected = "columns time_s, east_m and north_m"
