@@ -371,7 +371,6 @@ OPENING = {
     "ZipFile", "GzipFile", "read_dataframe", "list_layers", "read_info", "read_parquet", "load",
     "loadtxt", "genfromtxt", "fromfile", "read_file", "read_excel", "read_json",
 }  # fmt: skip
-OWN = ("Ways", "OpenMap", "cls", "journeys")
 LIBRARIES = {"pd", "pq", "np", "rasterio", "pyogrio", "gzip", "zipfile", "geopandas", "os", "io"}
 
 

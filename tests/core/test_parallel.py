@@ -5,7 +5,7 @@ from concurrent.futures import Executor, Future
 
 import pytest
 
-from mapfilter._parallel import SerialExecutor, local_executor, ordered_results
+from mapfilter._parallel import SerialExecutor, local_executor, ordered_results, rest_of
 from mapfilter.errors import InputError, MapfilterError, fail
 
 
@@ -133,3 +133,12 @@ def test_a_serial_future_holds_the_error_until_asked_and_lets_an_interrupt_throu
 
     with pytest.raises(KeyboardInterrupt):
         SerialExecutor().submit(interrupted)
+
+
+def test_what_was_done_before_is_counted():
+    counted = []
+    report = rest_of(lambda *at: counted.append(at), 3, 5)
+    report(1, 2)
+    report(2)
+    assert counted == [(3, 5), (4, 5), (5, 5)]
+    rest_of(None, 3, 5)(1, 2)

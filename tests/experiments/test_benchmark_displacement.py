@@ -18,7 +18,6 @@ from mapfilter.tracks.imu_noise import ImuNoise
 
 SEED = 5
 NUMBERS = range(12)
-PERFECT = ImuNoise(sigma_trans_m=0.0, sigma_orient_deg=0.0)
 FIXED = frozenset({"imu.sigma_orient_deg"})
 
 

@@ -25,7 +25,6 @@ SOUND = LevelErrors(
     site_share=0.5, common_share=0.25, roughness=0.0, fault_probability=1e-300, fault_m=1e-3,
     weight=1.0,
 )  # fmt: skip
-NOTHING = np.zeros(0, dtype=np.int32)
 
 
 def raster(bands, seed=1):

@@ -7,8 +7,6 @@ from command_line import assert_done, assert_refused, contents, mapfilter, setti
 
 from mapfilter.roads.maps import resolve_map
 
-BOX = "24.9420,60.1660,24.9495,60.1697"
-
 
 @pytest.mark.parametrize("command", ["predict", "build", "simulate"])
 @pytest.mark.parametrize(

@@ -21,7 +21,6 @@ from mapfilter.simulation.worlds.radio import Radio, RadioModel, planners_offset
 
 SEEDS = 600
 CLEAN = RadioModel(guiding_db=0.0, eirp_sd_db=0.0, azimuth_sd_deg=0.0, slope_sd=0.0)
-UNSHADED = {"area_sd_db": 0.0, "street_sd_db": 0.0, "own_sd_db": 0.0}
 
 
 @pytest.fixture(scope="module")
