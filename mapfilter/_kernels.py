@@ -8,7 +8,7 @@ the order of the work changes nothing. Functions are polynomials in single preci
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, lru_cache
 from math import pi, sqrt
 from typing import Any
 
@@ -72,7 +72,7 @@ def on_demand(
     return kernel
 
 
-@cache
+@lru_cache(64)
 def by_address(function: Any, signature: Any) -> Any:
     """Return a compiled function as other kernels take it, by its address.
 
