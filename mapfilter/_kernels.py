@@ -8,12 +8,12 @@ the order of the work changes nothing. Functions are polynomials in single preci
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache, lru_cache
+from functools import cache
 from math import pi, sqrt
 from typing import Any
 
 import numpy as np
-from numba import boolean, float64, int64, njit, types, void
+from numba import boolean, float64, int64, njit, void
 
 MEASURE_SIGNATURE = void(
     float64[:, ::1],
@@ -70,19 +70,6 @@ def on_demand(
         return compiled
 
     return kernel
-
-
-@lru_cache(64)
-def by_address(function: Any, signature: Any) -> Any:
-    """Return a compiled function as other kernels take it, by its address.
-
-    Given the function itself, numba looks its address up in each call of a kernel, which takes
-    longer than an update of a single belief.
-    """
-    found = types.CompileResultWAP(function.get_compile_result(signature))
-    # Asked for before the slower ways to tell a type.
-    vars(found)["_numba_type_"] = types.FunctionType(signature)
-    return found
 
 
 def draw_key(rng: np.random.Generator) -> np.uint64:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numba import boolean, float64, int64, njit, types, void
 
-from mapfilter._kernels import MEASURE_SIGNATURE, by_address, on_demand
+from mapfilter._kernels import MEASURE_SIGNATURE, on_demand
 from mapfilter._types import Bools, Floats
 from mapfilter.filters._square_root import (
     Lanes,
@@ -215,12 +215,6 @@ def kernel_of(method: Method) -> Callable[..., None]:
     if method.sigma is not None:
         return _compiled(_by_sigma_points)
     return _compiled(_iterated if method.iterations > 1 else _linearised)
-
-
-def given_to_runs(method: Method, measure: Callable[..., None]) -> tuple[Any, Any]:
-    """Return the compiled update and a compiled measurement, as the kernels of runs take them."""
-    update = by_address(kernel_of(method), UPDATE_SIGNATURE)
-    return update, by_address(measure, MEASURE_SIGNATURE)
 
 
 @kernel

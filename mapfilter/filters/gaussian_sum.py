@@ -21,16 +21,7 @@ from mapfilter._kernels import on_demand
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.filters._square_root import Problem, kernel
-from mapfilter.filters._updates import (
-    BLOCK,
-    INDEX,
-    MATRIX,
-    RUN,
-    TYPES,
-    VECTOR,
-    advance,
-    given_to_runs,
-)
+from mapfilter.filters._updates import BLOCK, INDEX, MATRIX, RUN, TYPES, VECTOR, advance, kernel_of
 from mapfilter.filters.gaussian import Method, factor_of
 from mapfilter.filters.trials import CompiledMeasurement, checked_sizes, problem_of
 
@@ -266,12 +257,12 @@ def run_mixtures(
     starts = np.broadcast_to(np.asarray(first_mean, dtype=np.float64), (trials, n))
     factor = factor_of(first.covariance, n)
     problem = problem_of(measurement, transition, process, method)
-    functions = given_to_runs(method, measurement.measure)
     means, covariances = np.empty((trials, steps, n)), np.empty((trials, steps, n, n))
     evidence, counts = np.empty((trials, steps)), np.empty((trials, steps), dtype=np.int64)
     for trial in range(trials):
         means[trial], covariances[trial], evidence[trial], counts[trial] = _run_mixture_kernel()(
-            *functions,
+            kernel_of(method),
+            measurement.measure,
             problem,
             np.ascontiguousarray(readings[trial]),
             np.ascontiguousarray((starts[trial] + first.means).T),

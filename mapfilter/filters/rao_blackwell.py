@@ -21,7 +21,7 @@ import numpy as np
 from annotated_types import Ge, Le
 from numpy.typing import ArrayLike
 
-from mapfilter._kernels import MEASURE_SIGNATURE, by_address, draw_key
+from mapfilter._kernels import draw_key
 from mapfilter._types import Floats, Floats32, Ints
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.filters._rao_blackwell import (
@@ -224,8 +224,7 @@ def update(
         Entries.of(np.zeros((0, 0)) if loading is None else loading),
     )
     log_weight, state = belief.log_weight.copy(), belief.state.copy()
-    measure = by_address(measurement.measure, MEASURE_SIGNATURE)
-    least = weigh_kernel()(measure, weighing, state, log_weight)
+    least = weigh_kernel()(measurement.measure, weighing, state, log_weight)
     weight = np.empty(log_weight.size, dtype=np.float32)
     total, effective = normalise(log_weight, weight)
     if not isfinite(total):

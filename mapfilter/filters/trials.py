@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from mapfilter._types import Floats, Ints
 from mapfilter.errors import Faults, InputError
 from mapfilter.filters._square_root import Problem
-from mapfilter.filters._updates import given_to_runs, run_lanes_kernel
+from mapfilter.filters._updates import kernel_of, run_lanes_kernel
 from mapfilter.filters.gaussian import Method, factor_of, factors_of
 
 LANES = 64
@@ -112,13 +112,13 @@ def run_trials(
     factors = factors_of(given, n) if each else factor_of(given, n)[None]
     factors = np.broadcast_to(factors.reshape(-1, n, n), (trials, n, n))
     problem = problem_of(measurement, transition, process, method)
-    functions = given_to_runs(method, measurement.measure)
     means, found = np.empty((trials, steps, n)), np.empty((trials, steps * covariances, n, n))
     evidence, nis = np.empty((trials, steps)), np.empty((trials, steps))
     for first in range(0, trials, LANES):
         block = slice(first, min(first + LANES, trials))
         run = run_lanes_kernel()(
-            *functions,
+            kernel_of(method),
+            measurement.measure,
             problem,
             np.ascontiguousarray(readings[block].transpose(1, 2, 0)),
             np.array(starts[block].T, order="C"),
