@@ -11,34 +11,23 @@ import mapfilter as mf
 WEST_M, NORTH_M, SIDE_PX = 455_000.0, 5_431_000.0, 400
 
 
-def write_roads(folder):
-    """Write a raster of three streets, one of them a footway; return a configuration."""
+@pytest.fixture
+def roads(tmp_path):
+    """A raster of three streets, one of them a footway, and a configuration."""
     values = np.zeros((SIDE_PX, SIDE_PX), dtype=np.uint8)
     values[100, 20:380] = values[20:380, 200] = 1
     values[300, 50:150] = 2
     with rasterio.open(
-        folder / "roads.tif", "w", driver="GTiff", height=SIDE_PX, width=SIDE_PX, count=1,
+        tmp_path / "roads.tif", "w", driver="GTiff", height=SIDE_PX, width=SIDE_PX, count=1,
         dtype="uint8", crs="EPSG:32632", transform=rasterio.Affine(1, 0, WEST_M, 0, -1, NORTH_M),
     ) as target:  # fmt: skip
         target.write(values, 1)
-    (folder / "roads.toml").write_text(
+    (tmp_path / "roads.toml").write_text(
         '[area]\nmap = "none"\n[roads]\nraster = "roads.tif"\n'
         "raster_classes = { residential = 1, footway = 2 }\n"
         '[database]\ncells = false\n[output]\ndir = "out"\n'
     )
-    return folder / "roads.toml"
-
-
-@pytest.fixture
-def roads(tmp_path):
-    return write_roads(tmp_path)
-
-
-@pytest.fixture(scope="module")
-def built(tmp_path_factory):
-    """The database of these streets, which nobody may change."""
-    file = write_roads(tmp_path_factory.mktemp("streets"))
-    return mapfilter("build", "-c", file, "--json").json["database"]
+    return tmp_path / "roads.toml"
 
 
 def write_drive(folder):
@@ -72,7 +61,8 @@ def test_the_flag_needs_neither_plan_nor_rasters(roads):
     assert mapfilter("build", "--roads-only", "-c", roads).code == 0
 
 
-def test_what_a_database_of_roads_alone_cannot_do_is_refused(roads, built):
+def test_what_a_database_of_roads_alone_cannot_do_is_refused(roads):
+    built = mapfilter("build", "-c", roads, "--json").json["database"]
     drive = write_drive(roads.parent)
     for command in (
         ("build", "-c", roads, "--dry-run"),
@@ -91,51 +81,57 @@ def test_what_a_database_of_roads_alone_cannot_do_is_refused(roads, built):
         assert "the filter bayes starts by the streets alone" in outcome.err
 
 
-def test_a_drive_that_is_too_short_is_said_to_be(built, tmp_path):
-    drive = tmp_path / "drive.csv"
+def test_a_drive_that_is_too_short_is_said_to_be(roads):
+    built = mapfilter("build", "-c", roads, "--json").json["database"]
+    drive = roads.parent / "drive.csv"
     pd.DataFrame({"time_s": [0.0, 1.0], "step_m": 2.0, "turn_rad": 0.0}).to_csv(drive, index=False)
-    outcome = mapfilter("replay", "--db", built, "--log", drive, "--out", tmp_path / "short")
+    outcome = mapfilter("replay", "--db", built, "--log", drive, "--out", roads.parent / "short")
     assert (outcome.code, "too short a way" in outcome.err) == (3, True)
 
 
-def test_a_filter_without_a_map_over_roads_alone_has_no_start(built, tmp_path):
-    drive, out = write_drive(tmp_path), tmp_path / "ekf"
+def test_a_filter_without_a_map_over_roads_alone_has_no_start(roads):
+    built = mapfilter("build", "-c", roads, "--json").json["database"]
+    drive, out = write_drive(roads.parent), roads.parent / "ekf"
     done = mapfilter("replay", "--db", built, "--log", drive, "--filter", "ekf", "--out", out)
     assert (done.code, "no positions and no radio to start from" in done.err) == (3, True)
 
 
-def test_steps_without_turns_are_said_to_be(built, tmp_path):
-    drive = tmp_path / "drive.csv"
+def test_steps_without_turns_are_said_to_be(roads):
+    built = mapfilter("build", "-c", roads, "--json").json["database"]
+    drive = roads.parent / "drive.csv"
     pd.DataFrame({"time": range(60), "wheel_speed_kmh": 30.0}).to_csv(drive, index=False)
-    done = mapfilter("replay", "--db", built, "--log", drive, "--out", tmp_path / "a", "--json")
+    done = mapfilter("replay", "--db", built, "--log", drive, "--out", roads.parent / "a", "--json")
     assert (done.code, "no headings and no turns" in done.err) == (3, True)
     assert not any("taken for a vehicle" in note for note in done.json["notes"])
 
 
-def test_a_drive_that_fits_no_street_ends_with_advice(built, tmp_path):
-    drive = write_drive(tmp_path)
+def test_a_drive_that_fits_no_street_ends_with_advice(roads):
+    built = mapfilter("build", "-c", roads, "--json").json["database"]
+    drive = write_drive(roads.parent)
     given = ("replay", "--db", built, "--log", drive, "--json")
-    notes = mapfilter(*given, "--out", tmp_path / "a").json["notes"]
+    notes = mapfilter(*given, "--out", roads.parent / "a").json["notes"]
     assert notes[0].startswith("never converged in 80 m: by streets alone it takes about a kilo")
     assert "set filter.bayes.vehicle = true" in notes[1]
-    stated = mapfilter(*given, "--set", "filter.bayes.vehicle=true", "--out", tmp_path / "b")
+    stated = mapfilter(*given, "--set", "filter.bayes.vehicle=true", "--out", roads.parent / "b")
     assert [note.split(":")[0] for note in stated.json["notes"]] == ["never converged in 80 m"]
 
 
-def test_positions_alone_are_no_way_that_fits_no_street(built, tmp_path):
+def test_positions_alone_are_no_way_that_fits_no_street(roads):
     """It said that the way of 0 m is too short, and a walker's."""
-    drive = tmp_path / "fixes.csv"
+    built = mapfilter("build", "-c", roads, "--json").json["database"]
+    drive = roads.parent / "fixes.csv"
     places = {"east_m": WEST_M + 100.0 + np.arange(60), "north_m": NORTH_M - 100.5}
     pd.DataFrame({"time_s": np.arange(60.0), **places}).to_csv(drive, index=False)
     given = ("replay", "--db", built, "--log", drive, "--json")
-    done = mapfilter(*given, "--out", tmp_path / "a")
+    done = mapfilter(*given, "--out", roads.parent / "a")
     told = "note: no motion: positions alone are followed ("
     assert (done.code, told in done.err) == (0, True), done.err
     assert done.json["switched"]
     assert not any("never converged" in note or "walker" in note for note in done.json["notes"])
 
 
-def test_a_log_without_a_frame_is_one_of_the_database(roads, built):
+def test_a_log_without_a_frame_is_one_of_the_database(roads):
+    built = mapfilter("build", "-c", roads, "--json").json["database"]
     drive = write_drive(roads.parent)
     log = roads.parent / "drive"
     assert "local frame" in mapfilter("convert", drive, "--out", log).out
