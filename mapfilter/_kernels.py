@@ -53,12 +53,13 @@ _E2, _E3, _E4, _E5 = (_F(v) for v in (0.5, 1 / 6, 1 / 24, 1 / 120))
 
 
 def on_demand(
-    signature: Any, function: Callable[..., Any], *, contract: bool = False
+    signature: Any, function: Callable[..., Any], *, contract: bool = False, argument: bool = False
 ) -> Callable[[], Callable[..., Any]]:
     """Return a function that returns a kernel of one signature, compiled at the first call of it.
 
     With its signature in a decorator a kernel is compiled on import, for seconds, by every command
-    that imports its module. ``contract`` allows fused products and sums.
+    that imports its module. ``contract`` allows fused products and sums; ``argument`` says that it
+    is an argument of other kernels (:func:`as_argument`).
     """
 
     @cache
@@ -67,8 +68,22 @@ def on_demand(
         compiled: Callable[..., Any] = njit(
             [signature], cache=True, nogil=True, error_model="numpy", fastmath=fast
         )(function)
-        return compiled
+        return as_argument(compiled, signature) if argument else compiled
 
+    return kernel
+
+
+def as_argument(compiled: Any, signature: Any) -> Callable[..., Any]:
+    """Return a kernel whose addresses are looked up once, for calls of kernels that it is given to.
+
+    Else numba compares its types and asks for both addresses at each call, which takes as long as
+    a Kalman update.
+    """
+    look_up = compiled.get_compile_result
+    found = look_up(signature)
+    found.library.get_pointer_to_function = cache(found.library.get_pointer_to_function)
+    compiled.get_compile_result = lambda sought: found if sought == signature else look_up(sought)
+    kernel: Callable[..., Any] = compiled
     return kernel
 
 

@@ -2,8 +2,8 @@
 
 import gc
 import os
-from collections.abc import Generator, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -81,17 +81,30 @@ def few_single_reports() -> Iterator[None]:
         yield
 
 
-@pytest.fixture(scope="module")
-def small_pictures() -> Iterator[None]:
-    """Draw pictures of few pixels, and do not lay them out, which takes longer than drawing them.
+@pytest.fixture(scope="session")
+def drawn_small() -> Callable[[], AbstractContextManager[None]]:
+    """Return a context in which pictures have few pixels and are not laid out.
 
-    For tests that ask for files and names: those of the room report have pictures as a user does.
+    Laying out takes longer than drawing. For tests that ask for files and names: those of the room
+    report have pictures as a user does.
     """
-    from mapfilter.report import saving
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(saving, "_laid_out", _not_laid_out)
-        patch.setattr(saving, "DPI", 20)
+    @contextmanager
+    def within() -> Iterator[None]:
+        from mapfilter.report import saving
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(saving, "_laid_out", _not_laid_out)
+            patch.setattr(saving, "DPI", 20)
+            yield
+
+    return within
+
+
+@pytest.fixture(scope="module")
+def small_pictures(drawn_small: Callable[[], AbstractContextManager[None]]) -> Iterator[None]:
+    """Draw small pictures in the whole module."""
+    with drawn_small():
         yield
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numba import boolean, float64, int64, njit, types, void
 
-from mapfilter._kernels import MEASURE_SIGNATURE, on_demand
+from mapfilter._kernels import MEASURE_SIGNATURE, as_argument, on_demand
 from mapfilter._types import Bools, Floats
 from mapfilter.filters._square_root import (
     Lanes,
@@ -204,10 +204,8 @@ def _by_sigma_points(measure: Any, problem: Problem, reading: Floats, lanes: Lan
 
 @cache
 def _compiled(update: Callable[..., None]) -> Callable[..., None]:
-    compiled: Callable[..., None] = njit(
-        [UPDATE_SIGNATURE], cache=True, nogil=True, error_model="numpy"
-    )(update)
-    return compiled
+    compiled = njit([UPDATE_SIGNATURE], cache=True, nogil=True, error_model="numpy")(update)
+    return as_argument(compiled, UPDATE_SIGNATURE)
 
 
 def kernel_of(method: Method) -> Callable[..., None]:

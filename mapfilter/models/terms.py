@@ -291,5 +291,5 @@ def measure(
                     slope[i, clock, :] = 1.0
 
 
-measure_kernel = on_demand(MEASURE_SIGNATURE, measure)
+measure_kernel = on_demand(MEASURE_SIGNATURE, measure, argument=True)
 """Return :func:`measure`, compiled."""

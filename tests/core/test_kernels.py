@@ -2,10 +2,20 @@
 
 import numpy as np
 import pytest
-from numba import njit
+from numba import float64, int64, njit, types
+from numba.core.errors import TypingError
 from scipy import stats
 
-from mapfilter._kernels import cos_sin32, draw_key, exp32, hashed, log32, normals, wrap32
+from mapfilter._kernels import (
+    as_argument,
+    cos_sin32,
+    draw_key,
+    exp32,
+    hashed,
+    log32,
+    normals,
+    wrap32,
+)
 
 
 @njit
@@ -68,3 +78,25 @@ def test_functions_agree_with_numpy():
     assert np.abs(out[4]).max() <= np.float32(np.pi) + 1e-6
     turns = (out[4] - exact) / (2 * np.pi)
     np.testing.assert_allclose(turns, np.round(turns), atol=1e-6)
+
+
+def test_addresses_of_a_kernel_that_is_an_argument_are_looked_up_once(monkeypatch):
+    of_one, asked = float64(float64), []
+    double, triple = (njit([of_one])(one) for one in (lambda x: 2 * x, lambda x: 3 * x))
+    call = njit([float64(types.FunctionType(of_one), float64)])(lambda function, x: function(x))
+    library = type(triple.get_compile_result(of_one).library)
+    look_up = library.get_pointer_to_function
+
+    def counted(self, name):
+        asked.append(name)
+        return look_up(self, name)
+
+    monkeypatch.setattr(library, "get_pointer_to_function", counted)
+    assert as_argument(triple, of_one) is triple
+    assert [call(triple, x) for x in (1.0, 2.0, 5.0)] == [3.0, 6.0, 15.0]
+    assert len(asked) == len(set(asked)) == 2
+    # The other one's are its own, at each call.
+    assert [call(double, x) for x in (1.0, 2.0, 5.0)] == [2.0, 4.0, 10.0]
+    assert len(asked) == 8
+    with pytest.raises(TypingError):
+        triple.get_compile_result(int64(int64))

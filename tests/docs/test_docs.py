@@ -64,7 +64,7 @@ def test_the_quickstart_has_examples():
 
 @pytest.mark.long
 @pytest.mark.usefixtures("few_single_reports")
-def test_quickstart_commands_run(tmp_path, monkeypatch):
+def test_quickstart_commands_run(tmp_path, monkeypatch, drawn_small):
     """All but the demo, which is these same steps, one after another in an empty folder."""
     text = page("quickstart.rst")
     toml = re.search(r"code-block:: toml\n\n((?:   .*\n|\n)+)", text)
@@ -78,7 +78,8 @@ def test_quickstart_commands_run(tmp_path, monkeypatch):
             continue
         if "my-walk" in command:
             shutil.copytree("out/journeys/journey-0001-draw-000", "my-walk")
-        result = CliRunner().invoke(app, shlex.split(command), catch_exceptions=False)
+        with drawn_small():
+            result = CliRunner().invoke(app, shlex.split(command), catch_exceptions=False)
         assert result.exit_code == 0, (command, result.output)
     found = {path.name for path in (tmp_path / "located").rglob("*")}
     named_there = {f"estimate.{kind}" for kind in ("parquet", "gpx", "geojson")}

@@ -18,6 +18,8 @@ def porto(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> list[s
         "area.map": shared_data / "osm-extracts" / "porto.osm.pbf",
         "area.southwest": "-8.6235,41.1325",
         "area.size_m": "3000,3000",
+        # Journeys are as predicted.
+        "prediction.ground_truth.write": "false",
         "output.pictures": "none",
     }
     out = ["--out", str(tmp_path_factory.mktemp("porto"))]

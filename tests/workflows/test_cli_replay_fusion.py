@@ -83,6 +83,9 @@ def walk(seed=1, steps=200, *, motion=False, gnss=False, timing=True, levels=Tru
     return make_log(CRS, **tables), truth
 
 
+NO_PICTURES = ["--set", "output.pictures=none"]
+
+
 def errors_m(log, truth, method=EKF):
     bound = KalmanFilter(method=method.name).over_sites(PLAN)
     track = locate(log, bound, np.random.default_rng(0))
@@ -191,7 +194,8 @@ def test_replay_needs_a_plan_and_no_map(tmp_path):
     estimate = read_estimate(tmp_path / "out" / "estimate.parquet")
     assert np.hypot(estimate.east_m - truth[:, 0], estimate.north_m - truth[:, 1])[-1] < 20
     assert {"track.png", "error.png"} == {file.name for file in (tmp_path / "out").glob("*.png")}
-    done = CliRunner().invoke(app, [*words, *plan, "--smooth"], catch_exceptions=False)
+    more = ["--smooth", *NO_PICTURES]
+    done = CliRunner().invoke(app, [*words, *plan, *more], catch_exceptions=False)
     assert json.loads(done.stdout.splitlines()[-1])["error_mean_m"] < told["error_mean_m"]
 
 
@@ -200,7 +204,7 @@ def test_timing_advances_are_in_steps_of_the_technology_that_the_plan_states(tmp
     write_log(log, tmp_path / "walk")
     rows = PLAN_CSV.replace("antenna\n", "antenna,technology\n").replace(",omni\n", ",omni,LTE\n")
     (tmp_path / "cells.csv").write_text(rows.replace(",55,", ",25,"), encoding="utf-8")
-    words = ["replay", "--filter", "ekf", "--log", str(tmp_path / "walk"), "--json"]
+    words = ["replay", "--filter", "ekf", "--log", str(tmp_path / "walk"), "--json", *NO_PICTURES]
     words += ["--set", f"cells.plan={tmp_path / 'cells.csv'}", "--out", str(tmp_path / "out")]
     done = CliRunner().invoke(app, words, catch_exceptions=False)
     notes = json.loads(done.stdout.splitlines()[-1])["notes"]
@@ -210,7 +214,7 @@ def test_timing_advances_are_in_steps_of_the_technology_that_the_plan_states(tmp
 def test_fixes_and_steps_are_replayed_without_the_sites_of_the_cells(tmp_path):
     log, _ = walk(motion=True, gnss=True)
     write_log(log, tmp_path / "walk")
-    words = ["replay", "--filter", "ekf", "--log", str(tmp_path / "walk"), "--json"]
+    words = ["replay", "--filter", "ekf", "--log", str(tmp_path / "walk"), "--json", *NO_PICTURES]
     told, radio = {}, len(log.radio)
     for name, more in (("all", []), ("less", ["--without", "radio,tdoa"])):
         given = [*words, *more, "--out", str(tmp_path / name)]
@@ -245,7 +249,7 @@ def test_replay_takes_antennas_from_their_files(tmp_path):
     write_log(log, tmp_path / "walk")
     rows = PLAN_CSV.replace("antenna\n", "antenna,azimuth_deg\n").replace(",omni\n", ",panel,30\n")
     (tmp_path / "cells.csv").write_text(rows, encoding="utf-8")
-    words = ["replay", "--filter", "ukf", "--log", str(tmp_path / "walk"), "--json"]
+    words = ["replay", "--filter", "ukf", "--log", str(tmp_path / "walk"), "--json", *NO_PICTURES]
     words += ["--set", f"cells.plan={tmp_path / 'cells.csv'}", "--out", str(tmp_path / "out")]
     with pytest.raises(InputError, match="no folder of antennas"):
         CliRunner().invoke(app, words, catch_exceptions=False)

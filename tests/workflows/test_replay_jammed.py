@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
-from command_line import assert_done, assert_refused, mapfilter
+from command_line import assert_done, assert_refused, mapfilter, settings
 
 from mapfilter.positioning.estimate_store import read_estimate
 
@@ -42,7 +42,8 @@ def replay(tmp_path):
         for name, rows in tables.items():
             rows.to_csv(tmp_path / f"{name}.csv", index=False)
             given += ["--log", tmp_path / f"{name}.csv"]
-        return mapfilter("replay", "--filter", "ekf", *given, "--out", tmp_path / "out", *more)
+        given += ["--out", tmp_path / "out", *settings(output__pictures="none")]
+        return mapfilter("replay", "--filter", "ekf", *given, *more)
 
     return of
 
