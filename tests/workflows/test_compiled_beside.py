@@ -16,7 +16,9 @@ from mapfilter.filters import hypotheses, particle, resampling
 from mapfilter.filters.contract import MotionStep
 from mapfilter.models import fingerprint, level_covariance, level_kernels, street_motion, way_map
 from mapfilter.positioning import integrity, step_output
-from mapfilter.positioning.bayes import area_map, evidence, model
+from mapfilter.positioning.bayes.area import area_map
+from mapfilter.positioning.bayes.beliefs import model
+from mapfilter.positioning.bayes.sources import evidence
 from mapfilter.workflows import kernels
 
 compiled = {

@@ -161,7 +161,7 @@ def test_the_picture_of_the_belief_comes_first_of_all(has_evidence, name):
 def test_a_replay_starts_what_draws_before_its_imports(pictures):
     """Both take about as long; asked of a process of its own."""
     code = (
-        "import sys\nfrom mapfilter.workflows import drawer\n"
+        "import sys\nfrom mapfilter.workflows.outputs import drawer\n"
         "def begin():\n    sys.exit(40 + ('pandas' in sys.modules or 'numba' in sys.modules))\n"
         "drawer.drawer_process = begin\n"
         "from mapfilter.cli import main\n"
