@@ -184,10 +184,10 @@ def test_names_that_no_file_can_have_say_what_to_write(tmp_path):
     rows = [ROWS[0], ["Nord/1", *ROWS[1][1:]]]
     said = refusal(tmp_path, workbook(rows), "cells.xlsx", layout="atoll")
     assert "give the cell that of its raster" in said
+    # No file is named by a site.
     rows = [[*ROWS[0], "SITE_NAME"], [*ROWS[1], "Nord/1"]]
-    said = refusal(tmp_path, workbook(rows), "cells.xlsx", layout="atoll")
-    assert "write it otherwise" in said
-    assert "raster" not in said
+    found = read(tmp_path, workbook(rows), "cells.xlsx", layout="atoll")
+    assert [cell.site for cell in found.cells] == ["Nord/1"]
 
 
 def test_faults_of_workbooks(tmp_path):
