@@ -267,8 +267,9 @@ def _check_number(where: str, value: Any, column: Column, faults: Faults) -> Non
 
 
 def _check_place(where: str, value: object, faults: Faults) -> None:
-    if not isinstance(value, tuple | list) or len(value) != len(PLACE):
+    given = value.tolist() if isinstance(value, np.ndarray) else value
+    if not isinstance(given, tuple | list) or len(given) != len(PLACE):
         faults.add(where, "three numbers, metres from the earth's centre", shown(value))
         return
-    for name, one in zip(PLACE, value, strict=True):
+    for name, one in zip(PLACE, given, strict=True):
         _check_number(f"{where}, {name}", one, _COLUMNS["pseudoranges"][name], faults)

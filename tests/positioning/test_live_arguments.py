@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cross_world import make_database
 
 import mapfilter as mf
 from mapfilter.filters.contract import MotionStep
-from mapfilter.positioning.epochs import ReportRow
+from mapfilter.positioning.epoch_checks import check_epoch
+from mapfilter.positioning.epochs import Pseudorange, ReportRow
 
 FILTERS = {
     "bayes": mf.BayesFilter(max_particles=600, min_search_particles=300, min_particles=200),
@@ -17,11 +17,6 @@ FILTERS = {
 }
 STEP = MotionStep(1.4, 0.3)
 EPOCH = mf.Epoch(0.0, (STEP,), (ReportRow("serving", "W", None, None, -70.0, 0),))
-
-
-@pytest.fixture(scope="module")
-def database(tmp_path_factory):
-    return make_database(tmp_path_factory.mktemp("cross"))
 
 
 @pytest.fixture(params=FILTERS)
@@ -70,6 +65,15 @@ def test_numbers_of_numpy_are_numbers(positioner):
     given = replace(EPOCH, motion=(replace(STEP, step_m=np.array(1.4)), STEP))
     _, output = positioner.step(positioner.begin(), given, np.random.default_rng(0))
     assert output.fix.time_s == 0.0
+
+
+@pytest.mark.parametrize("kind", [tuple, list, np.array])
+def test_the_place_of_a_satellite_may_be_an_array(kind):
+    given = Pseudorange("G07", 2.2e7, 5.0, kind([2.6e7, 0.0, 0.0]))
+    check_epoch(mf.Epoch(0.0, ranges=(given,)))
+    for wrong in (given.place_m[:2], kind([2.6e7, 0.0, 1e12]), np.array(2.6e7), np.zeros((3, 2))):
+        with pytest.raises(mf.MapfilterError, match=r"^epoch, ranges\[0\].place_m"):
+            check_epoch(mf.Epoch(0.0, ranges=(replace(given, place_m=wrong),)))
 
 
 @pytest.mark.parametrize(
