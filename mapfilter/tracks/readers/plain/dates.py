@@ -8,7 +8,8 @@ from dataclasses import replace
 from mapfilter.tracks.readers.plain.mapped import Mapped
 
 _DATE = "date"
-_A_DATE = re.compile(r"\d{1,4}([-./])\d{1,2}\1\d{2,4}\.?")
+_A_DATE = re.compile(r"(\d{4}([-./])\d{1,2}\2\d{1,2}|\d{1,2}([-./])\d{1,2}\3\d{4})\.?")
+"""With four digits of the year: others may be a version, such as 4.2.15."""
 _OF_DAY = re.compile(r"\d{1,2}:\d\d")
 
 
