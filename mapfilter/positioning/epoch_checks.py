@@ -129,7 +129,10 @@ def check_kinds_given(kinds: Collection[str]) -> None:
     InputError
         They are no collection of texts, or one of them is no kind.
     """
-    wrong = [kinds] if isinstance(kinds, str) else [one for one in kinds if one not in ALL_KINDS]
+    given: Any = kinds
+    wrong = [given]
+    if isinstance(given, Collection) and not isinstance(given, str):
+        wrong = [one for one in given if not (isinstance(one, str) and one in ALL_KINDS)]
     if wrong:
         expected = f"a collection of {', '.join(sorted(ALL_KINDS))}"
         raise fail(InputError, "kinds", expected, ", ".join(map(shown, wrong)))

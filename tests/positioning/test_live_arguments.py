@@ -77,7 +77,15 @@ def test_the_place_of_a_satellite_may_be_an_array(kind):
 
 
 @pytest.mark.parametrize(
-    ("kinds", "found"), [("motion", "'motion'"), (["motion", "moton"], "'moton'"), ([3], "3")]
+    ("kinds", "found"),
+    [
+        ("motion", "'motion'"),
+        (["motion", "moton"], "'moton'"),
+        ([3], "3"),
+        (3, "3"),
+        (None, "None"),
+        ([["motion"]], r"\['motion'\]"),
+    ],
 )
 @pytest.mark.parametrize("name", ["bayes", "ekf"])
 def test_kinds_of_a_journey_are_those_of_logs(database, name, kinds, found):
