@@ -6,7 +6,7 @@ was read; the test that all is well costs them little.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from math import inf, isnan
 from typing import Any
@@ -170,7 +170,7 @@ def _is_well(epoch: Any) -> bool:
         return False
     parts = (epoch.motion, epoch.radio, epoch.ranges, epoch.differences)
     # What can be gone over once only would be empty afterwards.
-    if not all(isinstance(part, tuple | list) for part in parts):
+    if not all(map(_are_rows, parts)):
         return False
     try:
         rows = (*epoch.motion, *epoch.radio, *epoch.ranges, *epoch.differences)
@@ -180,6 +180,10 @@ def _is_well(epoch: Any) -> bool:
         return all(map(_row_is_well, rows))
     except (TypeError, ValueError, KeyError):
         return False
+
+
+def _are_rows(given: Any) -> bool:
+    return isinstance(given, Sequence) and not isinstance(given, str | bytes)
 
 
 def _is_within(value: Any, low: float, high: float) -> bool:
@@ -229,7 +233,7 @@ def _report_is_well(row: Any) -> bool:
 def _rows(epoch: Epoch, faults: Faults) -> Iterator[tuple[str, type, Any]]:
     for name, kind in _KINDS.items():
         rows = getattr(epoch, name)
-        if not isinstance(rows, tuple | list):
+        if not _are_rows(rows):
             faults.add(f"epoch, {name}", f"a tuple of {kind.__name__}", shown(rows))
             continue
         for number, row in enumerate(rows):

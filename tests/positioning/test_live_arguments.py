@@ -1,5 +1,6 @@
 """What a live application gives to a filter by mistake is refused by its name."""
 
+from collections import deque
 from dataclasses import replace
 
 import numpy as np
@@ -52,6 +53,20 @@ def test_rows_that_can_be_gone_over_once_are_refused(positioner, name):
     given = replace(EPOCH, **{name: iter(getattr(EPOCH, name))})
     with pytest.raises(mf.MapfilterError, match=f"^epoch, {name}: expected a tuple of"):
         positioner.step(positioner.begin(), given, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("kind", [list, deque])
+def test_rows_may_be_any_sequence(positioner, kind):
+    given = replace(EPOCH, motion=kind(EPOCH.motion), radio=kind(EPOCH.radio))
+    (_, found), (_, expected) = (
+        positioner.step(positioner.begin(), epoch, np.random.default_rng(0))
+        for epoch in (given, EPOCH)
+    )
+    assert found == expected
+    with pytest.raises(mf.MapfilterError, match=r"^epoch, motion\[0\].step_m: expected"):
+        check_epoch(replace(given, motion=kind([replace(STEP, step_m=None)])))
+    with pytest.raises(mf.MapfilterError, match=r"^epoch, motion: .*, found 'step'"):
+        check_epoch(replace(given, motion="step"))
 
 
 @pytest.mark.parametrize("field", ["step_m", "heading_rad", "turn_rad"])
