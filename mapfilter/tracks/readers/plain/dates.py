@@ -28,4 +28,5 @@ def with_dates(mapped: Mapped) -> Mapped:
     if len(found) != 1:
         return mapped
     rows.reading.note(f"time: columns {found[0]} and {name}")
-    return replace(mapped, rows=rows.joined(found[0], name), beside=(found[0],))
+    joined = rows.joined(found[0], name)
+    return replace(mapped, rows=joined, beside=(found[0],), date=found[0])
