@@ -77,8 +77,11 @@ def as_argument(compiled: Any, signature: Any) -> Callable[..., Any]:
     """Return a kernel whose addresses are looked up once, for calls of kernels that it is given to.
 
     Else numba compares its types and asks for both addresses at each call, which takes as long as
-    a Kalman update.
+    a Kalman update. A function that was not compiled (``NUMBA_DISABLE_JIT``) is returned as it is.
     """
+    if not hasattr(compiled, "get_compile_result"):
+        plain: Callable[..., Any] = compiled
+        return plain
     look_up = compiled.get_compile_result
     found = look_up(signature)
     found.library.get_pointer_to_function = cache(found.library.get_pointer_to_function)

@@ -198,7 +198,8 @@ def utm_crs(lon_deg: float, lat_deg: float) -> str:
     ('EPSG:32629', 'EPSG:32635', 'EPSG:32734', 'EPSG:5041')
     """
     given: Any = (lat_deg, lon_deg)
-    if not all(isinstance(one, Real) for one in given):
+    # Arrays without a dimension are what `unproject` returns for a place.
+    if not all(isinstance(one[()] if _is_scalar(one) else one, Real) for one in given):
         got = f"{shown(lat_deg)}, {shown(lon_deg)}"
         raise fail(InputError, "latitude, longitude", "two numbers in degrees", got)
     if wrong := degree_fault(float(lat_deg), float(lon_deg)):
@@ -206,6 +207,10 @@ def utm_crs(lon_deg: float, lat_deg: float) -> str:
     if lat_deg > _MOST_UTM_DEG or lat_deg < _LEAST_UTM_DEG:
         return "EPSG:5041" if lat_deg > 0 else "EPSG:5042"
     return utm_zone_crs(utm_zone(lon_deg, lat_deg), lat_deg)
+
+
+def _is_scalar(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.ndim == 0
 
 
 def utm_crs_of(lon_deg: ArrayLike, lat_deg: ArrayLike) -> str:

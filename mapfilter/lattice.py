@@ -57,6 +57,11 @@ class Lattice:
     cols: int
 
     def __post_init__(self) -> None:
+        for name in ("west_m", "north_m"):
+            value: Any = getattr(self, name)
+            # As `project` returns the coordinates of a place; an array has no hash.
+            if isinstance(value, np.ndarray) and value.ndim == 0:
+                object.__setattr__(self, name, value.item())
         faults = Faults()
         try:
             projected_crs(self.crs, "lattice crs")

@@ -6,7 +6,7 @@ was read; the test that all is well costs them little.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from math import inf, isnan
 from typing import Any
@@ -129,7 +129,10 @@ def check_kinds_given(kinds: Collection[str]) -> None:
     InputError
         They are no collection of texts, or one of them is no kind.
     """
-    wrong = [kinds] if isinstance(kinds, str) else [one for one in kinds if one not in ALL_KINDS]
+    given: Any = kinds
+    wrong = [given]
+    if isinstance(given, Collection) and not isinstance(given, str):
+        wrong = [one for one in given if not (isinstance(one, str) and one in ALL_KINDS)]
     if wrong:
         expected = f"a collection of {', '.join(sorted(ALL_KINDS))}"
         raise fail(InputError, "kinds", expected, ", ".join(map(shown, wrong)))
@@ -167,7 +170,7 @@ def _is_well(epoch: Any) -> bool:
         return False
     parts = (epoch.motion, epoch.radio, epoch.ranges, epoch.differences)
     # What can be gone over once only would be empty afterwards.
-    if not all(isinstance(part, tuple | list) for part in parts):
+    if not all(map(_are_rows, parts)):
         return False
     try:
         rows = (*epoch.motion, *epoch.radio, *epoch.ranges, *epoch.differences)
@@ -177,6 +180,10 @@ def _is_well(epoch: Any) -> bool:
         return all(map(_row_is_well, rows))
     except (TypeError, ValueError, KeyError):
         return False
+
+
+def _are_rows(given: Any) -> bool:
+    return isinstance(given, Sequence) and not isinstance(given, str | bytes)
 
 
 def _is_within(value: Any, low: float, high: float) -> bool:
@@ -226,7 +233,7 @@ def _report_is_well(row: Any) -> bool:
 def _rows(epoch: Epoch, faults: Faults) -> Iterator[tuple[str, type, Any]]:
     for name, kind in _KINDS.items():
         rows = getattr(epoch, name)
-        if not isinstance(rows, tuple | list):
+        if not _are_rows(rows):
             faults.add(f"epoch, {name}", f"a tuple of {kind.__name__}", shown(rows))
             continue
         for number, row in enumerate(rows):
@@ -267,8 +274,9 @@ def _check_number(where: str, value: Any, column: Column, faults: Faults) -> Non
 
 
 def _check_place(where: str, value: object, faults: Faults) -> None:
-    if not isinstance(value, tuple | list) or len(value) != len(PLACE):
+    given = value.tolist() if isinstance(value, np.ndarray) else value
+    if not isinstance(given, tuple | list) or len(given) != len(PLACE):
         faults.add(where, "three numbers, metres from the earth's centre", shown(value))
         return
-    for name, one in zip(PLACE, value, strict=True):
+    for name, one in zip(PLACE, given, strict=True):
         _check_number(f"{where}, {name}", one, _COLUMNS["pseudoranges"][name], faults)

@@ -124,7 +124,7 @@ def _name_fault(value: Any, expected: str) -> tuple[str, str] | None:
     if not value.strip():
         return expected, "nothing"
     if value != value.strip():
-        return "an id without blanks around it", repr(value)
+        return "no blanks around it", repr(value)
     if len(value) > _LONGEST_ID:
         return expected, f"{len(value)} characters"
     return (expected, repr(value)) if _CONTROL.search(value) else None

@@ -43,8 +43,9 @@ def stated_otherwise(values: Mapping[str, str]) -> dict[str, str]:
     found = {}
     frequency = values.get("frequency_mhz", "")
     # A column of bands that is named for the frequency has words, where a number has none.
-    band = frequency if any(map(str.isalpha, frequency)) else values.get("band", "")
-    if (band == frequency or not frequency) and (mhz := band_mhz(band)) is not None:
+    named = any(map(str.isalpha, frequency))
+    band = frequency if named else values.get("band", "")
+    if (named or not frequency) and (mhz := band_mhz(band)) is not None:
         found["frequency_mhz"] = f"{mhz:g}"
     node, number = (_whole(values.get(name, "")) for name in ("enodeb", "cell_number"))
     if not values.get("ci") and number is not None:

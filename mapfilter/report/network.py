@@ -120,8 +120,9 @@ def plot_points_per_cell(
 ) -> Axes:
     """Draw the points that belong to each cell in a colour of its own.
 
-    With the cells of one site this is Fig. 2 of the paper, with all cells Fig. 4. Every group is
-    named on the map and, with its number of points, in the legend.
+    With the cells of one site this is Fig. 2 of the paper, with all cells Fig. 4. Groups are named
+    on the map where their names do not overlap those of larger ones, and all of them, with their
+    numbers of points, in the legend.
 
     Parameters
     ----------

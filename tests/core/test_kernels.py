@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numba import float64, int64, njit, types
+from numba.core import config
 from numba.core.errors import TypingError
 from scipy import stats
 
@@ -14,6 +15,7 @@ from mapfilter._kernels import (
     hashed,
     log32,
     normals,
+    on_demand,
     wrap32,
 )
 
@@ -100,3 +102,10 @@ def test_addresses_of_a_kernel_that_is_an_argument_are_looked_up_once(monkeypatc
     assert len(asked) == 8
     with pytest.raises(TypingError):
         triple.get_compile_result(int64(int64))
+
+
+def test_a_function_that_is_not_to_be_compiled_is_an_argument_as_it_is(monkeypatch):
+    """With NUMBA_DISABLE_JIT, by which kernels are debugged, a decorator returns the function."""
+    given = on_demand(float64(float64), lambda x: 2 * x, argument=True)
+    monkeypatch.setattr(config, "DISABLE_JIT", True)
+    assert given()(3.0) == 6.0

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapfilter.errors import InputError
+from mapfilter.geodesy import project
 from mapfilter.lattice import Lattice
 
 CRS = "EPSG:32629"
@@ -201,6 +202,14 @@ def test_what_is_no_lattice_is_refused(change, message):
     assert Lattice(**given | {"rows": np.int32(2), "west_m": np.float32(500000)}).rows == 2
     with pytest.raises(InputError, match=message):
         Lattice(**given | change)
+
+
+def test_a_corner_may_be_as_project_returns_it():
+    corner_m = project("EPSG:32629", -8.6, 41.1)
+    lattice = Lattice("EPSG:32629", *corner_m, 5.0, 2, 3)
+    assert lattice == Lattice("EPSG:32629", *map(float, corner_m), 5.0, 2, 3)
+    assert lattice.east_north(0, 0) == (float(corner_m[0]) + 2.5, float(corner_m[1]) - 2.5)
+    assert hash(lattice) == hash(Lattice("EPSG:32629", *map(float, corner_m), 5.0, 2, 3))
 
 
 @pytest.mark.parametrize("unknown", [np.nan, np.inf, -np.inf])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.geodesy import utm_crs
+from mapfilter.geodesy import unproject, utm_crs
 
 
 @pytest.mark.parametrize(
@@ -16,6 +16,7 @@ from mapfilter.geodesy import utm_crs
         ((24.9, float("nan")), r"found nan, 24.9$"),
         (("24.9", 60.2), r"expected two numbers in degrees, found 60.2, '24.9'$"),
         (([24.9], 60.2), r"expected two numbers in degrees, found 60.2, \[24.9\]$"),
+        ((np.array([24.9]), 60.2), r"expected two numbers in degrees, found 60.2, array"),
     ],
 )
 def test_what_is_no_place_in_degrees(place, message):
@@ -25,3 +26,4 @@ def test_what_is_no_place_in_degrees(place, message):
 
 def test_numbers_of_numpy_are_places():
     assert utm_crs(np.float32(24.9), np.int64(60)) == "EPSG:32635"
+    assert utm_crs(*unproject("EPSG:32635", 500_000.0, 6_700_000.0)) == "EPSG:32635"

@@ -26,6 +26,7 @@ def made(report=(0, 0, 1), cell=("a", "b", "a"), level_dbm=(-50.0, -60.0, -70.0)
         ({"report": (np.nan, 0, 1)}, r"^reading 1, report: expected a whole .*, found nothing$"),
         ({"report": (0, 0)}, r"^readings, cell: expected one for each of 2 in report, found 3\n"),
         ({"cell": ("a", None, "a")}, r"^reading 2, cell: expected the id of .*, found nothing"),
+        ({"cell": ("a", np.nan, "a")}, r"^reading 2, cell: expected the id of .*, found nothing"),
         ({"cell": ("a", "b", "")}, r"^reading 3, cell: expected the id of .*, found ''"),
         ({"cell": np.array(["", "b", "c"])}, r"^reading 1, cell: expected the id of .*, found ''"),
         ({"cell": pd.array(["a", "b", None], dtype="string")}, r"^reading 3, cell: expected"),
@@ -34,6 +35,11 @@ def made(report=(0, 0, 1), cell=("a", "b", "a"), level_dbm=(-50.0, -60.0, -70.0)
         ({"level_dbm": (100, -60, -70)}, r"^reading 1, .*, found 100 \(likely: what stands for a"),
         ({"level_dbm": (-np.inf, -60, -70)}, r"^reading 1, level_dbm: .*, found -inf$"),
         ({"level_dbm": ("loud", -60, -70)}, r"^readings, level_dbm: expected numbers, found could"),
+        ({"report": (), "cell": "a"}, r"^readings, cell: expected a column of values, found 'a'\n"),
+        ({"level_dbm": -60.0}, r"^readings, level_dbm: expected a column of values, found -60.0$"),
+        ({"sd_db": np.array(3.0)}, r"^readings, sd_db: expected a column of values, found array"),
+        ({"time_s": 5.0}, r"^reports, time_s: expected a column of values, found 5.0$"),
+        ({"count": 0}, r"^reading 1, report: expected no reading where count is 0, found 0\n"),
         ({"sd_db": (1.0,)}, r"^readings, sd_db: expected one for each of 3 in report, found 1$"),
         ({"time_s": (1, 2, 3)}, r"^reports, time_s: expected one for each of 2 reports, found 3$"),
         ({"places": np.zeros((3, 2))}, r"^reports, places: expected one for each of 2 reports"),
@@ -63,6 +69,20 @@ def test_numbers_name_transmitters_as_in_a_log(cell):
     found = made(report=(0, 1, 1), cell=cell)
     assert found.cell_ids == ("12", "7")
     assert found.cell.tolist() == [0, 0, 1]
+
+
+@pytest.mark.parametrize("serving", [[12, 7], [12.0, 7.0], np.array([12.0, 7.0])])
+def test_numbers_name_serving_cells_as_they_name_transmitters(serving):
+    found = made(report=(0, 1, 1), cell=[12.0, 12.0, 7.0], serving=serving)
+    assert found.cell_ids == ("12", "7")
+    assert found.serving.tolist() == [0, 1]
+
+
+@pytest.mark.parametrize("none", ["", None, np.nan, pd.NA])
+def test_a_report_may_have_no_serving_cell(none):
+    found = made(serving=["a", none])
+    assert found.cell_ids == ("a", "b")
+    assert found.serving.tolist() == [0, -1]
 
 
 def test_types_of_pandas_are_read():

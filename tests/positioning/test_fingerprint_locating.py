@@ -142,6 +142,14 @@ def test_reports_of_another_zone_are_refused(floor):
         mf.locate_reports(asked, floor[0], "knn")
 
 
+def test_reports_in_the_metres_of_the_database_are_located(floor):
+    asked = replace(floor[1], crs="EPSG:25835")
+    found = mf.locate_reports(asked, floor[0], "centroid")
+    assert found.crs == CRS
+    plain = mf.locate_reports(floor[1], floor[0], "centroid")
+    np.testing.assert_array_equal(found.east_m, plain.east_m)
+
+
 @pytest.mark.parametrize("method", ["nearest", 3, None])
 def test_an_unknown_method_is_refused(floor, method):
     with pytest.raises(ConfigError, match=", ".join(METHODS)):

@@ -1,14 +1,15 @@
 """What a live application gives to a filter by mistake is refused by its name."""
 
+from collections import deque
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from cross_world import make_database
 
 import mapfilter as mf
 from mapfilter.filters.contract import MotionStep
-from mapfilter.positioning.epochs import ReportRow
+from mapfilter.positioning.epoch_checks import check_epoch
+from mapfilter.positioning.epochs import Pseudorange, ReportRow
 
 FILTERS = {
     "bayes": mf.BayesFilter(max_particles=600, min_search_particles=300, min_particles=200),
@@ -17,11 +18,6 @@ FILTERS = {
 }
 STEP = MotionStep(1.4, 0.3)
 EPOCH = mf.Epoch(0.0, (STEP,), (ReportRow("serving", "W", None, None, -70.0, 0),))
-
-
-@pytest.fixture(scope="module")
-def database(tmp_path_factory):
-    return make_database(tmp_path_factory.mktemp("cross"))
 
 
 @pytest.fixture(params=FILTERS)
@@ -59,6 +55,20 @@ def test_rows_that_can_be_gone_over_once_are_refused(positioner, name):
         positioner.step(positioner.begin(), given, np.random.default_rng(0))
 
 
+@pytest.mark.parametrize("kind", [list, deque])
+def test_rows_may_be_any_sequence(positioner, kind):
+    given = replace(EPOCH, motion=kind(EPOCH.motion), radio=kind(EPOCH.radio))
+    (_, found), (_, expected) = (
+        positioner.step(positioner.begin(), epoch, np.random.default_rng(0))
+        for epoch in (given, EPOCH)
+    )
+    assert found == expected
+    with pytest.raises(mf.MapfilterError, match=r"^epoch, motion\[0\].step_m: expected"):
+        check_epoch(replace(given, motion=kind([replace(STEP, step_m=None)])))
+    with pytest.raises(mf.MapfilterError, match=r"^epoch, motion: .*, found 'step'"):
+        check_epoch(replace(given, motion="step"))
+
+
 @pytest.mark.parametrize("field", ["step_m", "heading_rad", "turn_rad"])
 def test_an_array_of_one_number_is_no_number(positioner, field):
     given = replace(EPOCH, motion=(replace(STEP, **{field: np.array([0.5])}),))
@@ -72,8 +82,25 @@ def test_numbers_of_numpy_are_numbers(positioner):
     assert output.fix.time_s == 0.0
 
 
+@pytest.mark.parametrize("kind", [tuple, list, np.array])
+def test_the_place_of_a_satellite_may_be_an_array(kind):
+    given = Pseudorange("G07", 2.2e7, 5.0, kind([2.6e7, 0.0, 0.0]))
+    check_epoch(mf.Epoch(0.0, ranges=(given,)))
+    for wrong in (given.place_m[:2], kind([2.6e7, 0.0, 1e12]), np.array(2.6e7), np.zeros((3, 2))):
+        with pytest.raises(mf.MapfilterError, match=r"^epoch, ranges\[0\].place_m"):
+            check_epoch(mf.Epoch(0.0, ranges=(replace(given, place_m=wrong),)))
+
+
 @pytest.mark.parametrize(
-    ("kinds", "found"), [("motion", "'motion'"), (["motion", "moton"], "'moton'"), ([3], "3")]
+    ("kinds", "found"),
+    [
+        ("motion", "'motion'"),
+        (["motion", "moton"], "'moton'"),
+        ([3], "3"),
+        (3, "3"),
+        (None, "None"),
+        ([["motion"]], r"\['motion'\]"),
+    ],
 )
 @pytest.mark.parametrize("name", ["bayes", "ekf"])
 def test_kinds_of_a_journey_are_those_of_logs(database, name, kinds, found):

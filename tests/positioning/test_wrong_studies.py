@@ -5,17 +5,12 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import pandas as pd
 import pytest
-from cross_world import CRS, make_database
+from cross_world import CRS
 
 import mapfilter as mf
 from mapfilter._arguments import check_arguments, executor_argument
 from mapfilter.experiments.sweep.table import SCHEMA
 from mapfilter.testing import check_filter
-
-
-@pytest.fixture(scope="module")
-def database(tmp_path_factory):
-    return make_database(tmp_path_factory.mktemp("cross"))
 
 
 def runs():

@@ -171,6 +171,12 @@ def test_a_band_that_is_named_for_the_frequency_states_it(tmp_path):
     assert "expected MHz" in complaint(tmp_path, text.replace("GSM 1800", "E-UTRA 3"), **named)
 
 
+def test_a_frequency_that_a_band_repeats_is_that_of_its_own_column(tmp_path):
+    text = SHOWN.replace("Frequency Band", "Frequency (MHz);Band").replace("GSM 1800", "1800;1800")
+    plan = read(tmp_path, text)
+    assert (plan["K1"].frequency_mhz, plan.notes) == (1800.0, ())
+
+
 def test_a_name_of_a_site_becomes_no_file(tmp_path):
     named = SHOWN.replace("Kamppi", "Kamppi / Nord..1")
     assert read(tmp_path, named)["K1"].site == "Kamppi / Nord..1"

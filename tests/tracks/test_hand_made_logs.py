@@ -192,7 +192,7 @@ def test_neighbours_without_any_level_are_noted_once(tmp_path):
     heard["level_dbm"] = np.nan
     log = make_log(CRS, radio=heard)
     assert len(log.notes) == 1
-    assert log.notes[0].startswith("radio: no row has a level (level_dbm); 12 neighbours tell")
+    assert log.notes[0].startswith("radio: no row has a level (level_dbm); 12 neighbours are of")
     write_log(log, tmp_path / "walk")
     assert read_log(tmp_path / "walk").notes == log.notes
     heard.loc[17, "level_dbm"] = -80.0

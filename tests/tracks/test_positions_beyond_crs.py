@@ -75,6 +75,14 @@ def test_metres_of_the_world_are_none_on_the_ground(tmp_path, crs, ground_m):
         assert f"where 100 m are {ground_m} m (likely: {hint})" in str(refused.value)
 
 
+def test_a_single_position_where_metres_are_none_is_no_fault():
+    """In the far north of it lengths of Europe's conic CRS are off by 15 %."""
+    places = table(LON_DEG)
+    assert mf.make_log("EPSG:3034", gnss=places.assign(lat_deg=[80.0, *places["lat_deg"][1:]]))
+    with pytest.raises(mf.MapfilterError, match=r"found 80, 25\S*, where 100 m are 85 m"):
+        mf.make_log("EPSG:3034", gnss=places.assign(lat_deg=80.0))
+
+
 def test_metres_of_the_world_are_right_at_the_equator():
     log = mf.make_log("EPSG:3857", gnss=table(LON_DEG).assign(lat_deg=5.0))
     assert (len(log.gnss), log.notes) == (30, ())

@@ -205,6 +205,23 @@ def test_a_date_of_another_name_that_stays_over_midnight_goes_on(tmp_path):
     assert any("the date stays the same over midnight" in note for note in found.notes)
 
 
+@pytest.mark.parametrize("beside", [{}, {"ns": "N", "ew": "E"}])
+def test_whole_times_that_run_back_by_a_day_are_no_midnight(tmp_path, beside):
+    """A later day before an earlier one, as of two files put together."""
+    times = [f"2026-05-0{day} 1{day}:00:{k:02d}" for day in (2, 1) for k in range(20)]
+    found = read(tmp_path, {"time": times, **PLACES, **beside})
+    assert np.ptp(found.tables["positions"]["time_s"]) == 25 * 3600 + 19
+    assert not any("midnight" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("version", ["4.2.15", "10.1.120", "1-2-30"])
+def test_numbers_of_versions_are_no_dates(tmp_path, version):
+    found = dated(tmp_path, ("Datum", "28.05.2026"), ("App", version))
+    assert "time: columns datum and uhrzeit" in found.notes
+    with pytest.raises(InputError, match="a time of day without its date"):
+        dated(tmp_path, ("App", version))
+
+
 def test_of_two_columns_of_dates_neither_is_taken(tmp_path):
     with pytest.raises(InputError, match="a time of day without its date"):
         dated(tmp_path, ("Datum", "28.05.2026"), ("Stand", "01.05.2026"))

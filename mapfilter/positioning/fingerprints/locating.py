@@ -10,7 +10,7 @@ import numpy as np
 
 from mapfilter._parallel import Progress
 from mapfilter.errors import ConfigError, InputError, fail
-from mapfilter.geodesy import same_crs, shown_crs
+from mapfilter.geodesy import same_grid, shown_crs
 from mapfilter.positioning.fingerprints.censoring import OPEN, Bounds, bounded, bounds_of
 from mapfilter.positioning.fingerprints.cross_validation import (
     MOST_VALIDATED,
@@ -186,10 +186,10 @@ def locate_by(fitted: ReportLocator, reports: Reports) -> LocatedReports:
     Raises
     ------
     InputError
-        The reports are in another CRS than the database.
+        The reports are in a CRS with other metres than that of the database.
     """
     database = fitted.database
-    if not same_crs(reports.crs, database.crs):
+    if not same_grid(reports.crs, database.crs):
         expected = f"{shown_crs(database.crs)}, the database's"
         hint = "log of another area or zone"
         raise fail(InputError, "log, crs", expected, shown_crs(reports.crs), hint)

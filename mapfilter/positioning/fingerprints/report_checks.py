@@ -62,15 +62,13 @@ def checked_columns(
         crs = projected_crs(crs, "reports, crs")
     except InputError as error:
         faults.found.extend(error.faults)
-    number = len(readings["report"])
+    number = _length(readings["report"])
     for name, given in readings.items():
-        if len(given) != number:
-            faults.add(f"readings, {name}", f"one for each of {number} in report", len(given))
+        each = f"one for each of {number} in report"
+        _check_length(f"readings, {name}", given, number, each, faults)
     for name, given in reports.items():
-        if len(given) != count:
-            faults.add(
-                f"reports, {name}", f"one for each of {number_of(count, 'report')}", len(given)
-            )
+        each = f"one for each of {number_of(count, 'report')}"
+        _check_length(f"reports, {name}", given, count, each, faults)
     if "places" in reports and np.shape(reports["places"]) != (count, 2):
         got = f"the shape {np.shape(reports['places'])}"
         faults.add("reports, places", f"east and north, the shape ({count}, 2)", got)
@@ -84,11 +82,39 @@ def checked_columns(
     return crs, columns
 
 
+def serving_cells(given: Any) -> np.ndarray[Any, Any]:
+    """Return the serving cells of reports as text, "" where there is none."""
+    if _are_texts(given):
+        return np.asarray(given)
+    return np.array(["" if pd.isna(one) else text_of(one) for one in pd.Series(given)], dtype=str)
+
+
+def _are_texts(given: Any) -> bool:
+    # Of a list NumPy would make texts of numbers and of NaN, too.
+    return isinstance(given, np.ndarray) and given.dtype.kind == "U"
+
+
+def _length(given: Any) -> int | None:
+    """Return the number of values of a column; None for what is none."""
+    if isinstance(given, str | bytes) or getattr(given, "ndim", 1) == 0:
+        return None
+    return len(given) if hasattr(given, "__len__") else None
+
+
+def _check_length(where: str, given: Any, count: int | None, each: str, faults: Faults) -> None:
+    length = _length(given)
+    if length is None:
+        faults.add(where, "a column of values", shown(given))
+    elif count is not None and length != count:
+        faults.add(where, each, length)
+
+
 def _reports(given: Any, count: int, faults: Faults) -> np.ndarray[Any, Any]:
     number = _numbers("report", given, faults)
     with np.errstate(invalid="ignore"):
         wrong = ~((number >= 0) & (number < count) & (number == np.floor(number)))
-    _add("report", wrong, f"a whole number in 0..{count - 1}", given, "", faults)
+    expected = f"a whole number in 0..{count - 1}" if count else "no reading where count is 0"
+    _add("report", wrong, expected, given, "", faults)
     return np.where(wrong, 0, number).astype(np.int64)
 
 
@@ -108,8 +134,8 @@ def _levels(given: Any, faults: Faults) -> Floats:
 
 
 def _cells(given: Any, faults: Faults) -> np.ndarray[Any, Any]:
-    cells = np.asarray(given)
-    if cells.dtype.kind == "U":
+    if _are_texts(given):
+        cells = np.asarray(given)
         wrong: Bools = cells == ""
     else:
         cells = np.asarray(pd.Series(given), dtype=object)

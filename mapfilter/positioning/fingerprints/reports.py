@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from mapfilter._types import Bools, Floats, Ints, Ints8, Ints32
 from mapfilter._words import number_of
 from mapfilter.positioning.fingerprints.planned import Planned
-from mapfilter.positioning.fingerprints.report_checks import checked_columns
+from mapfilter.positioning.fingerprints.report_checks import checked_columns, serving_cells
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -211,7 +211,7 @@ def make_reports(
         East and north, NaN where unknown.
     time_s, block, timing_advance : (count,) array, optional
     serving : sequence of ``count`` str, optional
-        Serving cell of each report, empty where there is none.
+        Serving cell of each report, empty or missing where there is none.
     sd_db, censored : (N,) array, optional
 
     Raises
@@ -245,7 +245,7 @@ def make_reports(
         {name: one for name, one in by_report.items() if one is not None},
     )
     names, which, level = given["cell"], given["report"], given["level_dbm"]
-    served = np.asarray(serving if serving is not None else np.full(count, ""), dtype=str)
+    served = serving_cells(serving) if serving is not None else np.full(count, "")
     cell_ids = np.unique(np.concatenate([names, served[served != ""]]))
     index = np.searchsorted(cell_ids, names).astype(np.int32)
     error = np.zeros(len(which)) if sd_db is None else np.asarray(sd_db, np.float64)

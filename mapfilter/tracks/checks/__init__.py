@@ -1,1 +1,1 @@
-"""What a log tells of its own mistakes: units, senses, clocks, exchanged columns."""
+"""Mistakes that a log's own tables show: units, senses, clocks, exchanged columns."""

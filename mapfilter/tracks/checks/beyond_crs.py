@@ -41,7 +41,10 @@ def without_beyond(
         Of the rows of a table; without them positions are counted.
     """
     if not beyond.all():
-        _check_ground(where, crs, float(lon_deg[~beyond][0]), float(lat_deg[~beyond][0]), faults)
+        within = np.flatnonzero(~beyond)
+        # One of a middle latitude, on which scales depend most: a single one may be wrong.
+        middle = within[np.argsort(lat_deg[within], kind="stable")[len(within) // 2]]
+        _check_ground(where, crs, float(lon_deg[middle]), float(lat_deg[middle]), faults)
     if not beyond.any():
         return ""
     row, count = int(np.argmax(beyond)), int(beyond.sum())

@@ -1,4 +1,4 @@
-"""Neighbours without levels tell little, and a column of levels was likely not read."""
+"""Neighbours without levels are of little use; a column of levels was likely not read."""
 
 from __future__ import annotations
 
@@ -28,14 +28,13 @@ def levels_note(radio: pd.DataFrame, where: str) -> tuple[str, ...]:
     --------
     >>> heard = pd.DataFrame({"role": ["neighbour"] * 12, "level_dbm": float("nan")})
     >>> levels_note(heard, "radio")[0][:55]
-    'radio: no row has a level (level_dbm); 12 neighbours te'
+    'radio: no row has a level (level_dbm); 12 neighbours ar'
     >>> levels_note(heard.assign(role="serving"), "radio")
     ()
     """
     count = int((radio["role"] == NEIGHBOUR).sum())
     if count < _FEW_ROWS or radio["level_dbm"].notna().any():
         return ()
-    few = (
-        f"{number_of(count, 'neighbour')} tell little without (likely: a column that was not read)"
-    )
-    return (f"{where}: {WITHOUT_LEVELS}; {few}",)
+    some = number_of(count, "neighbour is", "neighbours are")
+    use = f"{some} of little use without (likely: a column that was not read)"
+    return (f"{where}: {WITHOUT_LEVELS}; {use}",)

@@ -8,7 +8,8 @@ from dataclasses import replace
 from mapfilter.tracks.readers.plain.mapped import Mapped
 
 _DATE = "date"
-_A_DATE = re.compile(r"\d{1,4}([-./])\d{1,2}\1\d{2,4}\.?")
+_A_DATE = re.compile(r"(\d{4}([-./])\d{1,2}\2\d{1,2}|\d{1,2}([-./])\d{1,2}\3\d{4})\.?")
+"""With four digits of the year: others may be a version, such as 4.2.15."""
 _OF_DAY = re.compile(r"\d{1,2}:\d\d")
 
 
@@ -27,4 +28,5 @@ def with_dates(mapped: Mapped) -> Mapped:
     if len(found) != 1:
         return mapped
     rows.reading.note(f"time: columns {found[0]} and {name}")
-    return replace(mapped, rows=rows.joined(found[0], name), beside=(found[0],))
+    joined = rows.joined(found[0], name)
+    return replace(mapped, rows=joined, beside=(found[0],), date=found[0])

@@ -55,12 +55,15 @@ class Mapped:
         Columns of other fields, whose headers state quantity and unit.
     beside : tuple of str
         Columns that are used with those of fields.
+    date : str
+        That of the days of the times, which are joined with it; "" for none.
     """
 
     rows: Columns
     own: Mapping[str, str]
     stated: Mapping[str, str]
     beside: tuple[str, ...] = ()
+    date: str = ""
 
     def names(self, field: str) -> tuple[str, ...]:
         """Return the names of columns that may hold a field."""

@@ -256,9 +256,10 @@ def _note_gps(reading: Reading, name: str, known: Floats) -> None:
 
 def _over_midnight(mapped: Mapped, reading: Reading, time_s: Floats) -> Floats:
     """Return times that go on after midnight where a column of dates keeps the day of the start."""
-    dates = mapped.rows.texts(*mapped.beside)
-    dates = dates[mapped.rows.with_digits(*mapped.beside)]
-    if not mapped.beside or (dates[1:] != dates[:-1]).any():
+    if not mapped.date:
+        return time_s
+    dates = mapped.rows.texts(mapped.date)[mapped.rows.with_digits(mapped.date)]
+    if (dates[1:] != dates[:-1]).any():
         return time_s
     known_s = time_s[np.isfinite(time_s)]
     before_s = [reading.last_s] if np.isfinite(reading.last_s) else []
