@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-_ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/")
+_ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]{1,15}:/")
 """Of two letters or more before the colon: one is a drive. A Path has one of the two strokes."""
 _PATTERN = re.compile(r"[*?\[]")
 

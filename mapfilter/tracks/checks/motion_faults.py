@@ -169,7 +169,7 @@ def _comparable(ways: Stretches, motion: pd.DataFrame) -> tuple[Stretches, Compl
     moved_m = step_m * np.exp(1j * heading_rad)
     turned_rad = ways.turned_by(time_s, np.cumsum(moved_m))
     off_rad = [np.abs(wrap_rad(turned_rad - sign * ways.turned_rad)) for sign in (1, -1)]
-    known = np.abs(ways.grown(time_s, np.cumsum(unknown, dtype=np.float64))) == 0
+    known = ways.without(time_s, np.cumsum(unknown, dtype=np.float64))
     alike = known & (np.minimum(*off_rad) <= _AGREED_RAD)
     if alike.sum() >= max(_FEWEST, len(ways) / 2):
         return ways.where(alike), moved_m

@@ -13,6 +13,7 @@ _USUAL_M, _SHORTEST_M, _LONGEST_M = 40.0, 25.0, 300.0
 _COVERED = 0.6
 _LONGEST_TIMES = 5.0
 _FINEST, _COARSEST, _FEWER = 4096, 6, 1.4
+_ROUNDED = 1e-6
 FEWEST_PLACES = 6
 """With so many positions or fewer there are no stretches."""
 
@@ -71,6 +72,16 @@ class Stretches:
         mean = _means(np.interp(self.time_s, time_s, total), self.group)
         return np.asarray(mean[self.first + 2] - mean[self.first])
 
+    def without(self, time_s: Floats, count: Floats) -> Bools:
+        """Return along which pairs a count stays as it is; its means over places are rounded.
+
+        Parameters
+        ----------
+        time_s, count : (K,) array
+            Whole numbers, and their times.
+        """
+        return np.asarray(np.abs(self.grown(time_s, count)) < _ROUNDED)
+
     def with_known(self, time_s: Floats, values: Floats) -> Stretches:
         """Return the pairs along which every value of motion is known.
 
@@ -79,7 +90,7 @@ class Stretches:
         time_s, values : (K,) array
         """
         unknown = np.cumsum(~np.isfinite(values), dtype=np.float64)
-        return self.where(np.abs(self.grown(time_s, unknown)) == 0)
+        return self.where(self.without(time_s, unknown))
 
     def turned_by(self, time_s: Floats, reckoned_m: Complexes) -> Floats:
         """Return the change of course at the middle by positions of motion's own.
