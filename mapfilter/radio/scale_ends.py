@@ -15,14 +15,16 @@ modems and of Android, 31 (TS 27.007: -51); -24 and -43 are those of Android.
 """
 
 _LEAST_ROWS = 5
-_BELOW_DB = 2.5
+_BELOW_DB, _TIMES = 2.5, 3
 
 
 def at_scale_end(level_dbm: Floats) -> Bools:
     """Return which levels are bounds: the strongest ones, at an end of a scale, in a pile.
 
-    Levels become rarer towards the strongest one. Where more of them are at the end of a known
-    scale than in the 2.5 dB below, what lies beyond was put there. At least five have to be.
+    Levels become rarer towards the strongest one; on one way past a mast they are in the uppermost
+    2 dB for up to 2.4 times as long as in the next 2 dB. Where more than three times as many are at
+    the end of a known scale as in the 2.5 dB below, what lies beyond was put there. At least five
+    have to be.
 
     Parameters
     ----------
@@ -31,9 +33,9 @@ def at_scale_end(level_dbm: Floats) -> Bools:
 
     Examples
     --------
-    >>> at_scale_end(np.array([-51.0] * 5 + [-53.0] * 4 + [np.nan])).sum()
-    np.int64(5)
-    >>> at_scale_end(np.array([-51.0] * 5 + [-53.0] * 6)).any()
+    >>> at_scale_end(np.array([-51.0] * 7 + [-53.0] * 2 + [np.nan])).sum()
+    np.int64(7)
+    >>> at_scale_end(np.array([-51.0] * 7 + [-53.0] * 3)).any()
     np.False_
     """
     known = level_dbm[np.isfinite(level_dbm)]
@@ -43,6 +45,6 @@ def at_scale_end(level_dbm: Floats) -> Bools:
     at_end = level_dbm == strongest_dbm
     count = int(at_end.sum())
     below = int((known >= strongest_dbm - _BELOW_DB).sum()) - count
-    if count < _LEAST_ROWS or count <= below:
+    if count < _LEAST_ROWS or count <= _TIMES * below:
         return np.zeros(len(level_dbm), dtype=np.bool_)
     return np.asarray(at_end, dtype=np.bool_)

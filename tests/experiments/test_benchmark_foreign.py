@@ -21,7 +21,7 @@ def test_routes_take_the_cities_with_a_fault_in_turn(tmp_path, monkeypatch, rout
     city = SimpleNamespace(streets=SimpleNamespace(plan="plan", lattice="lattice"))
     monkeypatch.setattr(ForeignWorld, "city", city)
     monkeypatch.setattr(foreign, "given_inputs", lambda *given: given)
-    monkeypatch.setattr(foreign, "_filter", lambda *given: given)
+    monkeypatch.setattr(foreign, "opened_filter", lambda *given: given)
     world = ForeignWorld("harsh", tmp_path, seed=8)
     assert world.given(FAULTY, route) == ("cells-moved", "plan", "lattice", 8, variant)
     for name in (f"database-cells-moved-{variant}", "database"):
@@ -29,7 +29,7 @@ def test_routes_take_the_cities_with_a_fault_in_turn(tmp_path, monkeypatch, rout
         (tmp_path / name / "manifest.json").write_text(name)
         case = FAULTY if name != "database" else SimpleNamespace(fault=None)
         checksum = hashlib.sha256(name.encode()).hexdigest()
-        assert world.filter("options", case, route) == (tmp_path / name, "options", checksum)
+        assert world.filter("options", case, route) == (tmp_path / name, checksum, "options")
 
 
 def test_databases_are_named_by_fault_and_city():

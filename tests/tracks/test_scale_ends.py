@@ -59,14 +59,17 @@ def test_those_of_modems_end_at_51_dbm():
         np.round(walked(strongest_dbm=-47.0)),
         np.round(walked(strongest_dbm=-41.0)),
         np.append(by_modem(walked()), -46.0),
+        # Past a mast once, at an even pace.
+        2 * np.round((-48.0 - np.linspace(-4.6, 4.6, 200) ** 2) / 2),
+        np.round(-48.0 - np.linspace(-4.6, 4.6, 200) ** 2),
         np.append(np.full(4, -51.0), np.full(50, -70.0)),
         np.full(50, -60.0),
         np.full(50, np.nan),
         np.array([]),
     ],
     ids=[
-        "below", "few at the end", "no scale ends there", "one beyond", "four", "steady", "none",
-        "empty",
+        "below", "few at the end", "no scale ends there", "one beyond", "past a mast",
+        "past a mast in steps of 1 dB", "four", "steady", "none", "empty",
     ],
 )  # fmt: skip
 def test_nothing_else_is_a_bound(level_dbm):

@@ -181,7 +181,7 @@ def test_a_setting_inside_a_value_of_the_file(write):
 @pytest.mark.parametrize(
     ("box", "told"),
     [
-        ("60.1660,24.9420,60.1697,24.9495", "found none (likely: longitude and latitude swapped)"),
+        ("60.1660,24.9420,60.1697,24.9495", "(likely: longitude and latitude swapped)"),
         ("24.9420,160.1660,24.9495,160.1697", "(likely: longitude and latitude swapped)"),
         ("385795,6671660,386230,6672090", "(likely: metres given for degrees)"),
         ("24.9495,60.1697,24.9420,60.1660", "(likely: corners swapped)"),
