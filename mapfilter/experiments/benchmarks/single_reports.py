@@ -34,8 +34,8 @@ from mapfilter.positioning.fingerprints.options import (
     SurveyMaps,
     method_name,
 )
+from mapfilter.positioning.fingerprints.report_checks import NOT_RECEIVED_DBM
 from mapfilter.positioning.fingerprints.reports import Reports, make_reports
-from mapfilter.positioning.fingerprints.tables import NOT_RECEIVED_DBM
 
 WIFI = ("UJI1", "TUT1", "TUT3", "LIB1")
 WIFI_FOLDER = "fingerprint-wifi"

@@ -23,9 +23,7 @@ from mapfilter._types import Bools, Floats
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail, listed
 from mapfilter.geodesy import projected_crs, short_crs, utm_crs_of
-from mapfilter.positioning.fingerprints.report_checks import (
-    NOT_RECEIVED_DBM as NOT_RECEIVED_DBM,
-)
+from mapfilter.positioning.fingerprints.report_checks import NOT_RECEIVED_DBM
 from mapfilter.positioning.fingerprints.reports import Reports, make_reports
 
 _METRES = (("east_m", "north_m"), ("x_m", "y_m"), ("x", "y"))

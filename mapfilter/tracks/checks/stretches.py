@@ -14,6 +14,7 @@ _COVERED = 0.6
 _LONGEST_TIMES = 5.0
 _FINEST, _COARSEST, _FEWER = 4096, 6, 1.4
 _ROUNDED = 1e-6
+"""Rows by which a mean number of rows may be off, as it is interpolated between two of them."""
 FEWEST_PLACES = 6
 """With so many positions or fewer there are no stretches."""
 
