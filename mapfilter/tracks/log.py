@@ -47,6 +47,7 @@ from mapfilter.tracks.joining.moved import UNDIRECTED
 from mapfilter.tracks.log_times import seconds_of_tables
 from mapfilter.tracks.satellites import place_satellites
 from mapfilter.tracks.schema import PLACE, TABLES
+from mapfilter.tracks.stated_crs import placed_in
 from mapfilter.tracks.tables import tidy_table
 
 _PLACED = ("gnss", "truth")
@@ -281,5 +282,6 @@ def make_log(
         tables["pseudoranges"], more = place_satellites(rows, almanac, start_utc_s, where)
         every_note += more
     every_note = tuple(dict.fromkeys(every_note))
+    tables |= {name: placed_in(str(crs), tables[name]) for name in _PLACED}
     moved = None if vehicle is None else bool(vehicle)
     return TrackLog(str(crs), start_utc_s, **tables, notes=every_note, imu=imu, vehicle=moved)

@@ -27,12 +27,7 @@ from mapfilter.positioning.log_lacks import (
     lack_of_log,
 )
 from mapfilter.tracks.checks.log_checks import ends_early
-from mapfilter.tracks.checks.placeless import (
-    LOCAL_FRAME,
-    LOCAL_FRAME_HINT,
-    elsewhere_by,
-    is_local_frame,
-)
+from mapfilter.tracks.checks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT
 from mapfilter.tracks.checks.rounded_degrees import rounded_notes
 from mapfilter.tracks.checks.turn_drift import turn_drift_radps
 from mapfilter.tracks.log import TrackLog
@@ -58,17 +53,13 @@ _DIFFERENCES_AT_FAULT = "time differences of a site whose clock is off, or witho
 
 
 def check_log(path: Path, log: TrackLog, lattice: Lattice, faults: Faults) -> None:
-    """Note a log in another CRS than the database, or far outside its lattice.
+    """Note a log in a local frame, unlike the database, or far outside its lattice.
 
     Its truth, or its GNSS fixes, may not all lie more than 5 km outside.
     """
     if not same_crs(log.crs, lattice.crs):
         expected = f"{short_crs(lattice.crs)}, the database's"
-        local = is_local_frame(log.crs)
-        hint = LOCAL_FRAME_HINT if local else elsewhere_by(log, lattice)
-        if not local and short_crs(log.crs) == "unknown":
-            hint = f"convert it with --crs {short_crs(lattice.crs)}"
-        faults.add(f"{path}, crs", expected, LOCAL_FRAME if local else log.crs, hint)
+        faults.add(f"{path}, crs", expected, LOCAL_FRAME, LOCAL_FRAME_HINT)
         return
     check_places(str(path), log, lattice, faults)
 
