@@ -166,7 +166,8 @@ def locate(
     ----------
     log : TrackLog or path
         A log of another CRS than the database is projected, with a note; a path is read as by
-        :func:`mapfilter.read_log` in that CRS. Cells that it names by identity (mcc, mnc, lac, ci) get the ids of the database.
+        :func:`mapfilter.read_log` in that CRS. Cells that it names by identity (mcc, mnc, lac, ci)
+        get the ids of the database.
     database : RadioRouteDatabase, path or None
         A path is opened by each call; open it once for many logs. Kalman-type filters need none:
         ``locate(log, filter="ekf")`` is by GNSS fixes and dead reckoning. For levels and timing
@@ -199,9 +200,9 @@ def locate(
     Raises
     ------
     InputError
-        The log is in a local frame, unlike the database; all of its fixes, or of its ground truth, lie
-        more than 5 km outside of the database; or its fixes prove that a column of its motion is of
-        another unit or sense, for which there is no factor.
+        The log is in a local frame, unlike the database; all of its fixes, or of its ground truth,
+        lie more than 5 km outside of the database; or its fixes prove that a column of its motion
+        is of another unit or sense, for which there is no factor.
     StoreError
         A path holds no database, or one that is damaged.
     ConfigError
