@@ -31,10 +31,12 @@ from mapfilter.positioning.locators import DEFAULT, as_filter, filter_options
 from mapfilter.positioning.log_lacks import (
     NO_MOTION,
     POSITIONS_ALONE,
+    REPORTS_ALONE,
     advice_of,
     check_places,
     coarse_pixels_note,
     follows_positions,
+    is_of_reports_alone,
     lack_of_log,
 )
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
@@ -267,6 +269,8 @@ def _not_located(
     log: TrackLog, options: Any, estimate: TrackEstimate, database: RadioRouteDatabase | None
 ) -> tuple[str, ...]:
     """Return a note on what a log lacks that was not located, or not by motion; with a remedy."""
+    if is_of_reports_alone(log, options, estimate):
+        return (f"{REPORTS_ALONE} (mf.locate_reports locates each report by itself)",)
     if follows_positions(log, options, estimate):
         return (f"{POSITIONS_ALONE} ({_COURSE_MOTION})",)
     lack = lack_of_log(log, options, estimate, database)

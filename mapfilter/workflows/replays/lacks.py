@@ -21,9 +21,11 @@ from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.log_lacks import (
     NO_MOTION,
     POSITIONS_ALONE,
+    REPORTS_ALONE,
     check_places,
     coarse_pixels_note,
     follows_positions,
+    is_of_reports_alone,
     lack_of_log,
 )
 from mapfilter.tracks.checks.log_checks import ends_early
@@ -101,7 +103,10 @@ def lack_of(
 def _motion_note(
     opened: OpenedLog, log: TrackLog, options: Any, estimate: TrackEstimate
 ) -> tuple[str, ...]:
-    """Return a note on a log without motion that was located by its positions."""
+    """Return a note on a log without motion: what it was located by, and what locates it better."""
+    if is_of_reports_alone(log, options, estimate):
+        remedy = "mapfilter locate locates each report by itself"
+        return (f"{REPORTS_ALONE} ({remedy}){columns_of_motion(opened)}",)
     if not follows_positions(log, options, estimate):
         return ()
     made = _made_of_course(opened)
