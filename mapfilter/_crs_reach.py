@@ -73,6 +73,15 @@ def is_on_the_ground(crs: str, lon_deg: float, lat_deg: float) -> bool:
     return _is_true_to_scale(crs, lon_deg, lat_deg, _SCALE_TOLERANCE)
 
 
+def is_used_at(crs: str, lon_deg: float, lat_deg: float) -> bool:
+    """Return whether a place is in the area that a CRS is made for; not where it states none."""
+    area = area_of_use(crs)
+    if area is None or not (np.isfinite(lon_deg) and np.isfinite(lat_deg)):
+        return False
+    within = 0 <= (lon_deg - area.west) % 360 <= ((area.east - area.west) % 360 or 360)
+    return within and bool(area.south <= lat_deg <= area.north)
+
+
 def likely_mistake(crs: str, lon_deg: float, lat_deg: float) -> str:
     """Return the likely mistake of a place beyond a CRS: what puts it there, else the zone there.
 
@@ -99,11 +108,9 @@ def zone_hint(lon_deg: float, lat_deg: float) -> str:
 
 def _is_usual(crs: str, lon_deg: float, lat_deg: float) -> bool:
     """Return whether a place is in the area of a CRS, or, of one without, its lengths are right."""
-    area = area_of_use(crs)
-    if area is None:
+    if area_of_use(crs) is None:
         return _is_true_to_scale(crs, lon_deg, lat_deg, _NEAR_TOLERANCE)
-    within = 0 <= (lon_deg - area.west) % 360 <= (area.east - area.west) % 360
-    return within and bool(area.south <= lat_deg <= area.north)
+    return is_used_at(crs, lon_deg, lat_deg)
 
 
 def _corner_deg(square: int) -> tuple[int, int]:

@@ -43,7 +43,7 @@ def _same(a: Any, b: Any, compared: set[tuple[int, int]]) -> bool:
     """Return whether two things are the same; objects hold others that may lead back to them."""
     if is_dataclass(a) and not isinstance(a, type):
         return type(a) is type(b) and all(
-            _same(getattr(a, f.name), getattr(b, f.name), compared) for f in fields(a)
+            _same(getattr(a, f.name), getattr(b, f.name), compared) for f in fields(a) if f.compare
         )
     if isinstance(a, tuple | list):
         pairs = zip(a, b, strict=False) if type(a) is type(b) else ()

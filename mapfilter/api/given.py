@@ -8,6 +8,7 @@ from mapfilter._arguments import PATH, Argument
 from mapfilter.api.logs import read_log
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
+from mapfilter.tracks.checks.placeless import in_frame
 from mapfilter.tracks.log import TrackLog
 
 
@@ -34,5 +35,5 @@ def opened(database: RadioRouteDatabase | Path | str) -> RadioRouteDatabase:
 
 
 def read(log: TrackLog | Path | str, crs: str) -> TrackLog:
-    """Return a log, read where it is a path; recordings are read in ``crs``."""
-    return log if isinstance(log, TrackLog) else read_log(log, crs=crs)
+    """Return a log in a CRS, see :func:`in_frame`; read where it is a path."""
+    return in_frame(log, crs) if isinstance(log, TrackLog) else read_log(log, crs=crs)

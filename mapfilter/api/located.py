@@ -31,10 +31,12 @@ from mapfilter.positioning.locators import DEFAULT, as_filter, filter_options
 from mapfilter.positioning.log_lacks import (
     NO_MOTION,
     POSITIONS_ALONE,
+    REPORTS_ALONE,
     advice_of,
     check_places,
     coarse_pixels_note,
     follows_positions,
+    is_of_reports_alone,
     lack_of_log,
 )
 from mapfilter.positioning.log_options import STREETS_ALONE, by_streets_alone, fitted_to_log
@@ -165,8 +167,9 @@ def locate(
     Parameters
     ----------
     log : TrackLog or path
-        In the CRS of the database; a path is read as by :func:`mapfilter.read_log` in that CRS.
-        Cells that it names by identity (mcc, mnc, lac, ci) get the ids of the database.
+        A log of another CRS than the database is projected, with a note; a path is read as by
+        :func:`mapfilter.read_log` in that CRS. Cells that it names by identity (mcc, mnc, lac, ci)
+        get the ids of the database.
     database : RadioRouteDatabase, path or None
         A path is opened by each call; open it once for many logs. Kalman-type filters need none:
         ``locate(log, filter="ekf")`` is by GNSS fixes and dead reckoning. For levels and timing
@@ -199,9 +202,9 @@ def locate(
     Raises
     ------
     InputError
-        The log is in another CRS than the database; all of its fixes, or of its ground truth, lie
-        more than 5 km outside of the database; or its fixes prove that a column of its motion is of
-        another unit or sense, for which there is no factor.
+        The log is in a local frame, unlike the database; all of its fixes, or of its ground truth,
+        lie more than 5 km outside of the database; or its fixes prove that a column of its motion
+        is of another unit or sense, for which there is no factor.
     StoreError
         A path holds no database, or one that is damaged.
     ConfigError
@@ -266,6 +269,8 @@ def _not_located(
     log: TrackLog, options: Any, estimate: TrackEstimate, database: RadioRouteDatabase | None
 ) -> tuple[str, ...]:
     """Return a note on what a log lacks that was not located, or not by motion; with a remedy."""
+    if is_of_reports_alone(log, options, estimate):
+        return (f"{REPORTS_ALONE} (mf.locate_reports locates each report by itself)",)
     if follows_positions(log, options, estimate):
         return (f"{POSITIONS_ALONE} ({_COURSE_MOTION})",)
     lack = lack_of_log(log, options, estimate, database)

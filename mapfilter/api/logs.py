@@ -53,8 +53,9 @@ def read_log(
         A log's folder; or recordings (the page "Recordings of other programs" lists the formats),
         or a folder of them.
     crs : str
-        Projected CRS for recordings, such as ``database.lattice.crs``; else the UTM zone of their
-        positions. A track log keeps its own, and has a note where that is another one.
+        Projected CRS of the log, such as ``database.lattice.crs``; else the UTM zone of the
+        positions of recordings, and a track log's own. A track log of another one is projected,
+        with a note.
     truth : path, or several
         Recordings whose positions are the truth, and no measurements.
     format : str
@@ -122,8 +123,9 @@ def read_log(
     opened = open_log(given, crs=crs, options=options)
     log, kept = opened.log, bool(crs) and not opened.recordings
     if kept and not same_crs(projected_crs(crs, "read_log, crs"), log.crs):
-        own = LOCAL_FRAME if is_local_frame(log.crs) else short_crs(log.crs)
-        why = f"a track log is in its own, {own}"
+        why = f"the track log is in {LOCAL_FRAME}"
+        if not is_local_frame(log.crs):
+            why = f"headings in {short_crs(log.crs)} turn by the place, and the log has no position"
         log = replace(log, notes=(*log.notes, f"crs = {shown_crs(crs)} has no effect: {why}"))
     return log
 

@@ -52,8 +52,7 @@ def in_python(text: str) -> str:
     'mapfilter convert --crs EPSG:CODE; crs="EPSG:CODE"'
     """
     text = text.replace("--zone of convert and replay", "zone of mf.read_log")
-    # Of commands `convert` alone has it.
-    parts = _COMMAND.split(text.replace("mapfilter convert --offset", "--offset"))
+    parts = _COMMAND.split(text)
     return "".join(part if n % 2 else _without_options(part) for n, part in enumerate(parts))
 
 

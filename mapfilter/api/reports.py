@@ -18,6 +18,7 @@ from mapfilter.positioning.fingerprints.locating import locate_by, locator_for
 from mapfilter.positioning.fingerprints.options import AUTO, LEVEL_ERROR_DB, Method
 from mapfilter.positioning.fingerprints.reports import Reports
 from mapfilter.positioning.fingerprints.sources import reports_of_database, reports_of_logs
+from mapfilter.tracks.checks.placeless import in_frame
 from mapfilter.tracks.checks.range_units import with_range_notes
 from mapfilter.tracks.joining.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
@@ -37,11 +38,11 @@ def locate_reports(
     Parameters
     ----------
     log : TrackLog, Reports or path
-        What was received; in the CRS of the database. A path is read as by
-        :func:`mapfilter.read_log`.
+        What was received. A log of another CRS than the database is projected, with a note. A
+        path is read as by :func:`mapfilter.read_log`.
     database : RadioRouteDatabase or its path, Reports, TrackLog or several
-        Predicted or surveyed levels; or fingerprints: logs with ground truth, or a table of
-        :func:`mapfilter.read_fingerprint_table`.
+        Predicted or surveyed levels; or fingerprints: logs with ground truth, of which the first
+        has the CRS of all, or a table of :func:`mapfilter.read_fingerprint_table`.
     method : options, or str
         "knn", "probabilistic", "gp", "centroid", their options, or "auto" for the best of the first
         two in cross-validation.
@@ -53,7 +54,8 @@ def locate_reports(
     Raises
     ------
     InputError
-        The log is in another CRS than the database, or the database has no report with a position.
+        Reports, or a log in a local frame, are in another CRS than the database, or the database
+        has no report with a position.
     ConfigError
         There is no such method, an argument is none of these, or the seed is none.
     """
@@ -79,7 +81,7 @@ def locate_reports(
         logs = [database] if isinstance(database, TrackLog) else list(database)
         each = [Argument(f"database[{k}]", one, TrackLog, "a log") for k, one in enumerate(logs)]
         check_arguments("locate_reports", *each)
-        known = reports_of_logs(logs)
+        known = reports_of_logs([in_frame(one, logs[0].crs) for one in logs])
     if not isinstance(log, Reports):
         track = read(log, known.crs)
         if plan is not None:

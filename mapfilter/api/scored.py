@@ -22,6 +22,9 @@ from mapfilter.evaluation.truth import Truth
 from mapfilter.evaluation.truth_notes import truth_notes
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.tracks.checks.misplaced import check_near
+from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.projected import truth_in
+from mapfilter.tracks.stated_crs import crs_stated
 from mapfilter.tracks.tables import tidy_table
 
 _NO_TRUTH = (
@@ -80,15 +83,16 @@ class Score(Accuracy):
         return pd.DataFrame([{k: v for k, v in asdict(self).items() if k not in _NO_FIGURES}])
 
 
-def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
+def score(track: Track | TrackEstimate, truth: TrackLog | pd.DataFrame | Truth) -> Score:
     """Compare a track with ground truth.
 
     Parameters
     ----------
-    truth : DataFrame or Truth
-        Columns ``time_s``, ``east_m`` and ``north_m``, as the table ``truth`` of a log, in the CRS
-        of the track. As in :func:`mapfilter.make_log`, ``time_s`` may be the index, rows are sorted
-        by time, and exact duplicates dropped.
+    truth : TrackLog, DataFrame or Truth
+        A log with ground truth; or its table ``truth``, or another one with the columns ``time_s``,
+        ``east_m`` and ``north_m``. Where the log is in another CRS than the track, its truth is
+        projected; other tables are in the CRS of the track. As in :func:`mapfilter.make_log`,
+        ``time_s`` may be the index, rows are sorted by time, and exact duplicates dropped.
 
     Raises
     ------
@@ -96,14 +100,15 @@ def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
         The ground truth has fewer than two positions, lacks a column, has values that no log may
         have, such as NaN, or lies more than 5 km outside of the track's database.
     ConfigError
-        There is no track, or no table of ground truth.
+        There is no track, or no ground truth.
     """
     check_arguments(
         "score",
         Argument("track", track, Track | TrackEstimate, "a track of locate"),
-        Argument("truth", truth, pd.DataFrame | Truth, "a table such as log.truth"),
+        Argument("truth", truth, TrackLog | pd.DataFrame | Truth, "a log, or its table truth"),
     )
     estimate = track.estimate if isinstance(track, Track) else track
+    truth = truth.truth if isinstance(truth, TrackLog) else truth
     if not isinstance(truth, Truth):
         if truth.index.name == "time_s" and "time_s" not in truth:
             truth = truth.reset_index()
@@ -114,7 +119,7 @@ def score(track: Track | TrackEstimate, truth: pd.DataFrame | Truth) -> Score:
         faults = Faults()
         tidy, _ = tidy_table("truth", truth, "truth", faults)
         faults.raise_if_any(InputError)
-        known = Truth.of_table(tidy)
+        known = Truth.of_table(truth_in(estimate.crs, tidy, crs_stated(truth)))
         if known is None:
             got, hint = (len(truth), "") if len(truth) else ("none", _NO_TRUTH)
             raise fail(InputError, "truth", "two positions or more", got, hint)

@@ -21,7 +21,7 @@ from mapfilter.rasters.files import (
     as_stored,
     check_plausible,
 )
-from mapfilter.rasters.raster_set import RxLevRasters, in_other_case
+from mapfilter.rasters.raster_set import RxLevRasters, in_other_case, switched_off
 
 _TOO_SMALL_DB = 10.0
 
@@ -49,6 +49,8 @@ def check_ids(rasters: RxLevRasters, plan: CellPlan, where: str, findings: Findi
         findings.add("cell-without-raster", f"{where} and {rasters.path}", evidence)
     if unknown:
         evidence = f"{len(unknown)} of {len(held)} rasters have no cell: {listed(unknown)}."
+        off = switched_off(unknown, plan)
+        evidence += f" {off[:1].upper()}{off[1:]}." if off else ""
         findings.add("raster-without-cell", f"{rasters.path} and {where}", evidence)
 
 

@@ -13,7 +13,9 @@ from mapfilter.cli.options import (
     DeclinationOption,
     FactorOption,
     JsonOption,
+    OffsetOption,
     StepLengthOption,
+    clock_offsets,
     column_map,
     given_path,
     motion_factors,
@@ -59,12 +61,7 @@ def convert(
         typer.Option("--zone", help="Zone of local times, such as Europe/Brussels or +01:00."),
     ] = None,
     column: ColumnOption = None,
-    offset: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--offset", metavar="FILE=S", help="Seconds to add to the times of a file; repeatable."
-        ),
-    ] = None,
+    offset: OffsetOption = None,
     factor: FactorOption = None,
     course_motion: Annotated[
         bool,
@@ -86,7 +83,7 @@ def convert(
     """Convert recordings of other programs to a track log."""
     from mapfilter.tracks.joining.named_files import check_origin, offsets_by_path
     from mapfilter.tracks.open_options import CombineOptions, OpenOptions
-    from mapfilter.workflows.convert import parse_pairs, report_lines, run_convert
+    from mapfilter.workflows.convert import report_lines, run_convert
 
     given = [given_path(path) or path for path in files]
     true = [given_path(path) or path for path in truth or ()]
@@ -98,10 +95,7 @@ def convert(
             "--step-length": step_length,
         }
         refuse(given_beside, "--no-steps")
-    shifts = {
-        name: (numbers(text, 1, f"--offset {name}") or [0.0])[0]
-        for name, text in parse_pairs(offset or (), "--offset").items()
-    }
+    shifts = clock_offsets(offset)
     faults = Faults()
     if place is not None:
         check_origin((place[0], place[1]), "--origin", faults)

@@ -90,6 +90,12 @@ TruthOption = Annotated[
 ZoneOption = Annotated[
     str | None, typer.Option("--zone", help="Zone of local times in recordings.")
 ]
+OffsetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--offset", metavar="FILE=S", help="Seconds to add to the times of a file; repeatable."
+    ),
+]
 FactorOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -169,6 +175,24 @@ def column_map(texts: list[str] | None) -> dict[str, str]:
     check_fields(columns, faults)
     faults.raise_if_any(ConfigError)
     return columns
+
+
+def clock_offsets(texts: list[str] | None) -> dict[str, float]:
+    """Read ``--offset``: the seconds to add to the times of each recording, by its name.
+
+    Raises
+    ------
+    ConfigError
+        A text is no ``FILE=S``.
+    """
+    if not texts:
+        return {}
+    from mapfilter.workflows.convert import parse_pairs
+
+    return {
+        name: (numbers(text, 1, f"--offset {name}") or [0.0])[0]
+        for name, text in parse_pairs(texts, "--offset").items()
+    }
 
 
 def motion_factors(texts: list[str] | None) -> dict[str, float]:

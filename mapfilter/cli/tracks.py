@@ -18,6 +18,7 @@ from mapfilter.cli.options import (
     FactorOption,
     FilterOption,
     JsonOption,
+    OffsetOption,
     OutOption,
     SeedOption,
     SetOption,
@@ -25,6 +26,7 @@ from mapfilter.cli.options import (
     TruthOption,
     ZoneOption,
     check_custom_filter,
+    clock_offsets,
     column_map,
     given_path,
     motion_factors,
@@ -167,6 +169,7 @@ def replay(
     truth: TruthOption = None,
     zone: ZoneOption = None,
     column: ColumnOption = None,
+    offset: OffsetOption = None,
     factor: FactorOption = None,
     course_motion: Annotated[
         bool,
@@ -229,6 +232,9 @@ def replay(
                 given.append(f"{key}={toml([str(file) for file in files])}")
         columns = column_map(column)
         given += [f"track.columns.{field}={toml(name)}" for field, name in columns.items()]
+        if shifts := clock_offsets(offset):
+            pairs = ", ".join(f"{toml(name)} = {seconds!r}" for name, seconds in shifts.items())
+            given.append(f"track.offsets_s={{{pairs}}}")
         for column_name, number in motion_factors(factor).items():
             given.append(f"track.factors.{column_name}={number!r}")
         if course_motion:

@@ -97,6 +97,9 @@ class Track(Section):
         Zone of local times that state none, such as "Europe/Brussels" or "+01:00".
     origin : (float, float), optional
         Longitude and latitude at which a local frame of metres has its origin.
+    offsets_s : dict of str to float
+        Seconds to add to the times of recordings, by the name of each file; also of those of
+        ``truth``.
     course_motion : bool
         Make motion from the speed and course of a receiver, else from its positions, where nothing
         else gives it.
@@ -111,6 +114,7 @@ class Track(Section):
     format: Annotated[str, AfterValidator(_format_name)] = ""
     zone: str = ""
     origin: Pair | None = None
+    offsets_s: dict[str, float] = Field(default_factory=dict)
     course_motion: bool = False
     steps: bool = True
     walk: TrackWalk = TrackWalk()

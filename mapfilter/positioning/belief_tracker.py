@@ -22,7 +22,12 @@ from mapfilter.filters.contract import (
     checked_estimate,
     checked_pair,
 )
-from mapfilter.positioning.epoch_checks import check_epoch, check_generator, check_state_kind
+from mapfilter.positioning.epoch_checks import (
+    check_epoch,
+    check_generator,
+    check_later,
+    check_state_kind,
+)
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind
 from mapfilter.positioning.step_output import Fix, StepOutput, UnusedReading
@@ -41,11 +46,14 @@ class TrackState:
         Of the filter; None before the first epoch that it can start from.
     hypotheses : int
         Position hypotheses after the last update.
+    time_s : float
+        Time of the last epoch; NaN before the first.
     """
 
     belief: Any = None
     status: Status = Status.SEARCHING
     hypotheses: int = 0
+    time_s: float = nan
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,11 +117,12 @@ class BeliefTracker(Filter[TrackState]):
         Raises
         ------
         InputError
-            A value of the epoch is of another type or beyond its range, the state is one of another
-            filter, or ``rng`` is no generator.
+            A value of the epoch is of another type or beyond its range, it is before the last one,
+            the state is one of another filter, or ``rng`` is no generator.
         """
         check_epoch(epoch)
         check_state_kind(state, TrackState)
+        check_later(epoch, state.time_s)
         check_generator(rng)
         cell, reason, unused = self._serving(epoch)
         belief, status, count = state.belief, state.status, state.hypotheses
@@ -123,7 +132,7 @@ class BeliefTracker(Filter[TrackState]):
             if reason is not Reason.USED and not by_fix:
                 if cell:
                     unused.append(_unused(epoch, SERVING, cell, reason))
-                return state, StepOutput(
+                return replace(state, time_s=epoch.time_s), StepOutput(
                     Fix.nowhere(epoch.time_s, status, reason), unused=tuple(unused)
                 )
             belief = self.filter.init(self.reading_of(epoch), rng)
@@ -147,7 +156,8 @@ class BeliefTracker(Filter[TrackState]):
             status = Status.TRACKING
         located = checked_estimate(self.filter.locate(belief))
         fix = self._fix(epoch, located, status, count, reason)
-        return TrackState(belief, status, count), StepOutput(fix, unused=tuple(unused))
+        after = TrackState(belief, status, count, epoch.time_s)
+        return after, StepOutput(fix, unused=tuple(unused))
 
     def _serving(self, epoch: Epoch) -> tuple[str, Reason, list[UnusedReading]]:
         """Return the serving cell, whether the filter can start from it, and what is left out."""

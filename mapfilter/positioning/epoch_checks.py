@@ -164,6 +164,25 @@ def check_epoch(epoch: Epoch) -> None:
     faults.raise_if_any(InputError)
 
 
+def check_later(epoch: Epoch, last_s: float) -> None:
+    """Check that an epoch is not before the one that a state is of.
+
+    Parameters
+    ----------
+    last_s : float
+        Time of the epoch before; NaN for none.
+
+    Raises
+    ------
+    InputError
+        It is before that.
+    """
+    if epoch.time_s < last_s:
+        expected = f"{last_s!r} or later, as the epoch before is of that time"
+        hint = "epochs out of order, or a clock that was set back; begin anew after a pause"
+        raise fail(InputError, "epoch, time_s", expected, repr(epoch.time_s), hint)
+
+
 def _is_well(epoch: Any) -> bool:
     """Return whether all values are as expected; most epochs end here."""
     if not (isinstance(epoch, Epoch) and _is_within(epoch.time_s, _TIME.low, _TIME.high)):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from mapfilter._same import EqualByContent
 from mapfilter._types import Floats
@@ -49,9 +49,10 @@ class PositionedTrack(EqualByContent):
     snapshots : tuple of Snapshot
         Hypotheses at some epochs until the filter converged.
     filter_s : float
-        Processor time that the filter took, databases already in memory.
+        Processor time that the filter took, databases already in memory. Tracks that took another
+        time are equal.
     """
 
     estimate: TrackEstimate
     snapshots: tuple[Snapshot, ...]
-    filter_s: float
+    filter_s: float = field(compare=False)

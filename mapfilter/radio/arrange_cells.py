@@ -17,6 +17,7 @@ from mapfilter.radio.cell_layouts import (
     LIKELY,
     OFFSETS,
     OPENCELLID_HEADER,
+    TRANSLATED,
     USUAL,
     Columns,
     Layout,
@@ -36,7 +37,8 @@ class Arranged:
     """A table with the fields of a cell plan as columns.
 
     ``shown`` names fields in messages, with the file's own column; ``notes`` counts the values that
-    were filled in; ``decimal_comma`` allows commas in numbers.
+    were filled in; ``decimal_comma`` allows commas in numbers; ``inactive`` are cells that are
+    switched off, of which there are no rows.
     """
 
     header: tuple[str, ...]
@@ -44,6 +46,7 @@ class Arranged:
     shown: Mapping[str, str]
     notes: tuple[str, ...]
     decimal_comma: bool
+    inactive: tuple[str, ...] = ()
 
 
 def arrange(
@@ -79,7 +82,7 @@ def arrange(
         if values is not None:
             found.append((line, [values.get(name, "") for name in rule.names]))
     if tally.inactive and not found:
-        got = f"{number_of(tally.inactive, 'row')}, all of them inactive"
+        got = f"{number_of(len(tally.inactive), 'row')}, all of them inactive"
         raise fail(InputError, str(table.path), "at least one active transmitter", got)
     notes = (*table.notes, *tally.notes_of_values(header, picked, defaults, len(found)))
     for field, *helpers in MADE_OF:
@@ -87,11 +90,13 @@ def arrange(
             picked = {name: at for name, at in picked.items() if name not in helpers}
     unused = _unused(header, picked, layout, columns)
     units = doubtful_units([Heading.of(name) for name in header], picked)
-    notes += (*tally.notes_of_cells(), *filter(None, (units, unused)))
+    translated = "" if columns or layout != "atoll" else _translated(header, picked)
+    notes += (*tally.notes_of_cells(), *filter(None, (translated, units, unused)))
     shown = {
         name: f"{header[at[0]]} ({name})" for name, at in picked.items() if header[at[0]] != name
     }
-    return Arranged(rule.names, tuple(found), shown, notes, table.separator != ",")
+    comma = table.separator != ","
+    return Arranged(rule.names, tuple(found), shown, notes, comma, tuple(tally.inactive))
 
 
 def likely_names(layout: Layout, has: Iterable[str]) -> dict[str, tuple[str, ...]]:
@@ -148,7 +153,7 @@ def _pick(
     faults.raise_if_any(InputError)
     for field, names in LAYOUTS[layout].items():
         at = places_named(headings, field, names)
-        if at:
+        if at and not _is_ambiguous(field, [headings[one] for one in at]):
             picked.setdefault(field, tuple(at if field in ALIASES else at[:1]))
     if {"lat", "lon", "east", "north"} <= picked.keys():
         surplus = ("lat", "lon") if {"east", "north"} & columns.keys() else ("east", "north")
@@ -157,6 +162,24 @@ def _pick(
         _check_unit(table, field, (headings[at] for at in used), faults)
     faults.raise_if_any(InputError)
     return picked
+
+
+def _is_ambiguous(field: str, found: Sequence[Heading]) -> bool:
+    """Return whether headings in another language are several of a field, or mean another one."""
+    translated = _is_translated(field, found[0])
+    return translated and (len(found) > 1 or found[0].is_above_sea)
+
+
+def _is_translated(field: str, heading: Heading) -> bool:
+    return bool(places_named([heading], field, TRANSLATED.get(field, ())))
+
+
+def _translated(header: Sequence[str], picked: Mapping[str, tuple[int, ...]]) -> str:
+    """Return a note on the columns that are read by their names in another language, or ""."""
+    columns = ((field, header[places[0]]) for field, places in picked.items())
+    found = [(name, field) for field, name in columns if _is_translated(field, Heading.of(name))]
+    named = ", ".join(f"{name!r} ({field})" for name, field in found)
+    return f"columns read by their French or German names: {named}" if found else ""
 
 
 def _check_unit(table: Table, field: str, used: Iterable[Heading], faults: Faults) -> None:

@@ -31,15 +31,15 @@ class RowTally:
         Usual EIRPs that are lowered to what phones report, by technology.
     beyond : list of str
         Technologies whose limits an identity exceeds, in words.
-    inactive : int
-        Rows left out.
+    inactive : list of str
+        Cells of rows left out, as they are switched off.
     """
 
     filled: Counter[str] = field(default_factory=Counter)
     made: Counter[str] = field(default_factory=Counter)
     lowered: Counter[str] = field(default_factory=Counter)
     beyond: list[str] = field(default_factory=list)
-    inactive: int = 0
+    inactive: list[str] = field(default_factory=list)
 
     def notes_of_values(
         self,
@@ -64,7 +64,7 @@ class RowTally:
             )
         if self.inactive:
             which = header[picked["active"][0]]
-            notes.append(f"{number_of(self.inactive, 'row')} left out: inactive, by {which!r}")
+            notes.append(f"{number_of(len(self.inactive), 'row')} left out: inactive, by {which!r}")
         return notes
 
     def notes_of_cells(self) -> list[str]:
@@ -139,7 +139,7 @@ class RowRule:
         """Return the fields of a row, which is counted; None for an inactive cell."""
         values = {name: _first(texts, at) for name, at in self.picked.items()}
         if is_inactive(values):
-            tally.inactive += 1
+            tally.inactive.append(values.get("cell") or self._identity(values))
             return None
         given = (i for at in self.picked.values() for i in at if texts[i].strip())
         _by_technology(values, [self.implied[i] for i in given])
@@ -150,9 +150,13 @@ class RowRule:
             values["technology"] = self._technology_within_limits(line, values, tally)
         self._fill_in(values, tally)
         if self.composed:
-            parts = (values[name] for name in IDENTITY)
-            values["cell"] = "-".join(part for part in parts if part)
+            values["cell"] = self._identity(values)
         return values
+
+    @staticmethod
+    def _identity(values: Mapping[str, str]) -> str:
+        """Return the name of a cell that has none but its identity."""
+        return "-".join(filter(None, (values.get(name) for name in IDENTITY)))
 
     def _technology_within_limits(
         self, line: int, values: Mapping[str, str], tally: RowTally

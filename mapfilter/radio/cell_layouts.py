@@ -55,6 +55,26 @@ ATOLL: Columns = {
 }
 """Names of fields, and headings that Atoll shows for them, in which blanks stand for underscores
 and a unit in brackets may follow."""
+TRANSLATED: Columns = {
+    "cell": ("ÉMETTEUR",),
+    "site": ("STANDORT",),
+    "lat": ("BREITENGRAD",),
+    "lon": ("LÄNGENGRAD",),
+    "height_m": (
+        *("HAUTEUR", "HÖHE", "HOEHE", "HÖHE ÜBER GRUND", "MONTAGEHÖHE ÜBER GRUND"),
+        *("ANTENNENHÖHE", "ANTENNENHOEHE"),
+    ),
+    "azimuth_deg": ("HAUPTSTRAHLRICHTUNG",),
+    "downtilt_deg": ("DOWNTILT ÉLECTRIQUE", "TILT ÉLECTRIQUE"),
+    "mechanical_downtilt_deg": ("DOWNTILT MÉCANIQUE", "TILT MÉCANIQUE"),
+    "antenna": ("ANTENNE",),
+    "eirp_dbm": ("PIRE",),
+    "frequency_mhz": ("FRÉQUENCE", "FREQUENZ"),
+    "technology": ("TECHNOLOGIE",),
+    "active": ("ACTIF", "AKTIV"),
+}
+"""French and German names of columns of transmitters, with one meaning each: headings of Atoll in
+French, and of lists of sites of authorities."""
 HELPERS: Columns = {
     "band": ("FREQUENCY_BAND", "FBAND", "BAND"),
     "enodeb": ("ENODEB_ID", "ENB_ID"),
@@ -68,6 +88,8 @@ LIKELY: Columns = {
     "bsic": ("scrambling code",),
     "lac": ("location area", "tracking area"),
     "frequency_mhz": ("band",),
+    "cell": ("nom",),
+    "eirp_dbm": ("puissance", "sendeleistung"),
 }
 """Names that a planning tool's heading may hold if it means a field, and that may mean others."""
 USUAL: Columns = {
@@ -115,6 +137,9 @@ _OWN: Columns = {name: (name,) for name in (*COLUMNS, "east", "north", "crs", *O
 }
 LAYOUTS: Mapping[Layout, Columns] = {
     "plan": _OWN,
-    "atoll": {**{name: (*ATOLL.get(name, ()), *own) for name, own in _OWN.items()}, **HELPERS},
+    "atoll": {
+        name: (*ATOLL.get(name, ()), *own, *TRANSLATED.get(name, ()))
+        for name, own in {**_OWN, **HELPERS}.items()
+    },
     "opencellid": OPENCELLID,
 }

@@ -13,6 +13,7 @@ from mapfilter.geodesy import degree_fault, project, unproject
 from mapfilter.radio.arrange_cells import Arranged
 from mapfilter.radio.cell_layouts import OFFSETS
 from mapfilter.radio.cell_rows import Row
+from mapfilter.radio.plan_systems import unit_name
 
 _NEAR_DEG, _ZONE_M, _WIDEST_ZONE_FT = 3.0, 1e6, 2.8e6
 
@@ -58,17 +59,21 @@ def move_from_sites(rows: list[Row], table: Arranged) -> tuple[str, ...]:
 
 
 def _metre_fault(east: float, north: float, crs: str) -> tuple[str, str, str] | None:
-    expected, got = f"metres where {crs} is used", f"{east:g}, {north:g}"
+    unit = unit_name(crs)
+    expected, got = f"{unit} where {crs} is used", f"{east:g}, {north:g}"
     if max(abs(east), abs(north)) <= 180 and (_near(crs, east, north) or _near(crs, north, east)):
-        return expected, got, "degrees given for metres"
+        return expected, got, f"degrees given for {unit}"
     if _near(crs, *_degrees(crs, east, north)):
         return None
     zone_m = east // _ZONE_M * _ZONE_M if east > _WIDEST_ZONE_FT else 0.0
     likely = {
         "east and north swapped": (north, east),
         "eastings with the number of a zone in front, as of EPSG:4647": (east - zone_m, north),
-        "feet given for metres": (FOOT_M * east, FOOT_M * north),
     }
+    if unit == "metres":
+        likely["feet given for metres"] = FOOT_M * east, FOOT_M * north
+    elif "feet" in unit:
+        likely[f"metres given for {unit}"] = east / FOOT_M, north / FOOT_M
     near = (hint for hint, place in likely.items() if _near(crs, *_degrees(crs, *place)))
     return expected, got, next(near, "another CRS")
 

@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from mapfilter.errors import Faults, InputError
-from mapfilter.geodesy import projected_crs
+from mapfilter.errors import Faults
 from mapfilter.radio.arrange_cells import Arranged
 from mapfilter.radio.cell_layouts import OFFSETS
 from mapfilter.radio.cell_rules import (
@@ -44,8 +43,21 @@ class Row:
     faulty: bool = False
 
 
-def row_of(where: str, line: int, given: Mapping[str, str], table: Arranged, faults: Faults) -> Row:
-    """Return the values of a line that are as they should be."""
+def row_of(
+    where: str,
+    line: int,
+    given: Mapping[str, str],
+    table: Arranged,
+    systems: Mapping[str, str],
+    faults: Faults,
+) -> Row:
+    """Return the values of a line that are as they should be.
+
+    Parameters
+    ----------
+    systems : mapping of str to str
+        CRS by the text that rows state; what is not in it was a fault.
+    """
     row = Row(line, {})
     values = row.values
 
@@ -111,9 +123,6 @@ def row_of(where: str, line: int, given: Mapping[str, str], table: Arranged, fau
     if wrong := assumed_fault(values["assumed"]):
         refuse("assumed", *wrong)
     if given.get("crs"):
-        try:
-            values["crs"] = projected_crs(given["crs"], f"{where}, crs")
-        except InputError as error:
-            faults.found.extend(error.faults)
-            row.faulty = True
+        row.faulty = row.faulty or given["crs"] not in systems
+        values["crs"] = systems.get(given["crs"], given["crs"])
     return row

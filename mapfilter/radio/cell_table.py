@@ -6,14 +6,24 @@ import difflib
 from collections.abc import Mapping
 from itertools import chain
 from pathlib import Path
+from typing import NamedTuple
 
 from mapfilter.errors import Faults, InputError, fail, listed
 from mapfilter.radio.arrange_cells import arrange, likely_names, none_of, recognised
-from mapfilter.radio.cell_layouts import ALIASES, ATOLL, COLUMNS, LAYOUTS, OFFSETS, Layout
+from mapfilter.radio.cell_layouts import (
+    ALIASES,
+    ATOLL,
+    COLUMNS,
+    LAYOUTS,
+    OFFSETS,
+    TRANSLATED,
+    Layout,
+)
 from mapfilter.radio.cell_places import move_from_sites, place_rows
 from mapfilter.radio.cell_rows import DEFAULT_HINT, REQUIRED, Row, row_of
 from mapfilter.radio.cell_rules import RANGES
 from mapfilter.radio.headings import Heading, places_named, resembling, unit_of
+from mapfilter.radio.plan_systems import stated_systems, unit_notes
 from mapfilter.radio.tables import MOST_TITLES, Table, read_table
 
 _ALLOWED = {*COLUMNS, "east", "north", "crs", *OFFSETS, *chain.from_iterable(ALIASES.values())}
@@ -21,15 +31,27 @@ _OTHER_LAYOUTS: Mapping[Layout, str] = {
     "atoll": "transmitters of Atoll",
     "opencellid": "a list of OpenCellID or the Mozilla Location Service",
 }
-_TELLING: Mapping[Layout, tuple[str, ...]] = {"atoll": ATOLL["cell"], "opencellid": ("radio",)}
+_TELLING: Mapping[Layout, tuple[str, ...]] = {
+    "atoll": (*ATOLL["cell"], *TRANSLATED["cell"]),
+    "opencellid": ("radio",),
+}
 """Columns of which one is in every list of a layout, and in no plan."""
 _LEAST_KNOWN = 3
 _JOIN_SITES = (
     "Atoll keeps positions in the table Sites; add them to each transmitter by the name of its "
     "site, or name other columns in cells.columns.east and cells.columns.north"
 )
+_POWERS = ("power", "puissance", "leistung")
 _MISSPELT = 0.75
 """Least likeness of a short name that is misspelt."""
+
+
+class PlanRows(NamedTuple):
+    """Rows of a cell plan, remarks on what was filled in, and cells that are switched off."""
+
+    rows: list[Row]
+    notes: tuple[str, ...]
+    inactive: tuple[str, ...]
 
 
 def read_plan(
@@ -39,10 +61,10 @@ def read_plan(
     layout: Layout = "plan",
     columns: Mapping[str, str] | None = None,
     defaults: Mapping[str, float] | None = None,
-) -> tuple[list[Row], tuple[str, ...]]:
+) -> PlanRows:
     """Read and check every row of a cell plan, or of a list of another layout.
 
-    Faults of rows are added to ``faults``; also returned are remarks on defaults that were used.
+    Faults of rows are added to ``faults``.
 
     Raises
     ------
@@ -60,15 +82,23 @@ def read_plan(
     wrong.raise_if_any(InputError)
     if not arranged.rows and not faults.found:
         raise fail(InputError, str(path), "at least one cell", "a header without rows")
-    rows = []
-    for line, texts in arranged.rows:
-        given = {name: text.strip() for name, text in zip(arranged.header, texts, strict=True)}
-        rows.append(row_of(f"{path} row {line}", line, given, arranged, faults))
+    lines = [
+        {name: text.strip() for name, text in zip(arranged.header, texts, strict=True)}
+        for _, texts in arranged.rows
+    ]
+    stated = (given.get("crs", "") for given in lines)
+    known = stated_systems(stated, f"{path}, {arranged.shown.get('crs', 'crs')}", faults)
+    rows = [
+        row_of(f"{path} row {line}", line, given, arranged, known, faults)
+        for (line, _), given in zip(arranged.rows, lines, strict=True)
+    ]
     systems = {row.values.get("crs", crs) for row in rows}
     if len(systems) > 1:
         faults.add(f"{path}, crs", "one CRS in all rows", ", ".join(sorted(systems)))
-    place_rows(path, rows, crs, faults)
-    return rows, (*arranged.notes, *move_from_sites(rows, arranged))
+    placed = [row for row in rows if row.values.get("crs", crs) in {crs, *known.values()}]
+    place_rows(path, placed, crs, faults)
+    notes = (*arranged.notes, *unit_notes(known), *move_from_sites(rows, arranged))
+    return PlanRows(rows, notes, arranged.inactive)
 
 
 def _check_titles(where: str, table: Table) -> None:
@@ -138,7 +168,8 @@ def _check_fields(
         if name not in fields:
             hint = f"left out or misspelt; cells.columns.{name} names a column called otherwise"
             hint += f"; or {DEFAULT_HINT.format(name)}" if name in RANGES else ""
-            if name == "eirp_dbm" and any("power" in one.lower() for one in header):
+            powers = (word in one.lower() for one in header for word in _POWERS)
+            if name == "eirp_dbm" and any(powers):
                 what = "the power in dBm plus the antenna gain in dBi less losses"
                 hint = f"{what} belongs in it; else {hint}"
             faults.add(where, f"a column {name}", none_of(header), hint)

@@ -123,11 +123,14 @@ class CellPlan:
         Ids are unique. A database of roads alone has none.
     notes : tuple of str
         What was filled in or left out when it was read.
+    inactive : tuple of str
+        Ids of cells that its file has and switches off; they are none of ``cells``.
     """
 
     crs: str
     cells: tuple[Cell, ...]
     notes: tuple[str, ...] = field(default=(), compare=False)
+    inactive: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         faults = Faults()
@@ -204,7 +207,7 @@ class CellPlan:
         east_m, north_m = project(target, lon_deg, lat_deg)
         moved = zip(self.cells, east_m.tolist(), north_m.tolist(), strict=True)
         cells = tuple(replace(c, east_m=e, north_m=n) for c, e, n in moved)
-        return CellPlan(target, cells, self.notes)
+        return CellPlan(target, cells, self.notes, self.inactive)
 
 
 def check_cells(

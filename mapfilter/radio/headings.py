@@ -7,6 +7,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
+from unicodedata import combining, normalize
 
 _METRES = frozenset(
     {"m", "metre", "metres", "meter", "meters", "mètre", "mètres", "metros", "metri", "mtr", "magl"}
@@ -62,6 +63,8 @@ _PLACES = {"lat": _OF_DEGREES, "lon": _OF_DEGREES, "east": _OF_METRES, "north": 
 _KNOWN_UNITS = frozenset[str]().union(*(unit.written | unit.others for unit in _UNITS.values()))
 _BEFORE_UNITS = re.compile(r"^(in|decimal)\s+")
 """Words before a unit, as in "in m"; "in" alone is inches."""
+_ABOVE_SEA = re.compile(r"\b(?:nn|nhn|ngf|asl|amsl|msl)\b|\bü\.? ?m\b|üNN|niveau", re.IGNORECASE)
+"""What headings of heights above the sea say, which no antenna is told by."""
 _BRACKETS = {")": "(", "]": "["}
 _APART = re.compile(r"[\s_-]+")
 _ALIKE = 0.85
@@ -106,6 +109,17 @@ class Heading:
         if not (found and title and unit):
             return cls(name, _words(name), name, "")
         return cls(name, _words(title), title, unit.casefold())
+
+    @property
+    def is_above_sea(self) -> bool:
+        """Whether it says that heights are above the sea.
+
+        Examples
+        --------
+        >>> [Heading.of(f"Höhe (m{of})").is_above_sea for of in (" ü. NN", " ü. G.", "")]
+        [True, False, False]
+        """
+        return _ABOVE_SEA.search(self.name) is not None
 
     def fits(self, field: str) -> bool:
         """Return whether the heading has no unit, or the unit of a field."""
@@ -207,7 +221,9 @@ def _doubt(heading: Heading, field: str) -> int:
 
 
 def _words(name: str) -> str:
-    return _APART.sub(" ", name).strip().casefold()
+    """Return the words of a name in small letters, without accents, as some exports have them."""
+    apart = normalize("NFKD", _APART.sub(" ", name).strip().casefold())
+    return apart if apart.isascii() else "".join(one for one in apart if not combining(one))
 
 
 def _likeness(heading: str, name: str) -> float:

@@ -36,10 +36,10 @@ def read_cell_plan(
     """Read a cell plan from a CSV file and bring it into ``crs``.
 
     Commas, semicolons or tabs, UTF-8, one header line; decimal commas where they separate nothing.
-    Columns: cell, lat and lon (WGS 84) *or* east and north (in the CRS of a ``crs`` column, else in
-    ``crs``), height_m, eirp_dbm, frequency_mhz; and when wanted site, azimuth_deg, antenna, and the
-    other fields of :class:`Cell`. An empty field takes the default; without an azimuth the antenna
-    is omnidirectional.
+    Columns: cell, lat and lon (WGS 84) *or* east and north (in the CRS of a ``crs`` column, which
+    may be in feet, with a note; else in ``crs``), height_m, eirp_dbm, frequency_mhz; and when
+    wanted site, azimuth_deg, antenna, and the other fields of :class:`Cell`. An empty field takes
+    the default; without an azimuth the antenna is omnidirectional.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def read_cell_plan(
     check_fields("read_cell_plan, defaults", defaults or {}, STATED, faults)
     faults.raise_if_any(ConfigError)
     usual = {name: float(value) for name, value in (defaults or {}).items()}
-    rows, notes = read_plan(path, projected_crs(crs), faults, layout, columns, usual)
+    rows, notes, inactive = read_plan(path, projected_crs(crs), faults, layout, columns, usual)
     known = {each.name for each in fields(Cell)}
     whole = [row for row in rows if not row.faulty]
     if layout == "opencellid" and whole:
@@ -118,4 +118,4 @@ def read_cell_plan(
         faults.add(str(path), "at least one cell", "none")
     check_cells(cells, lambda i, name: f"{path} row {whole[i].line}, {name}", faults, ranges=False)
     faults.raise_if_any(InputError)
-    return CellPlan(crs, cells, notes)
+    return CellPlan(crs, cells, notes, inactive)

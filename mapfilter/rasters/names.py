@@ -29,7 +29,7 @@ def named_by_plan(rasters: RxLevRasters, plan: CellPlan) -> RxLevRasters:
     RxLevRasters
         With a note where names changed; ``check_against_plan`` finds the names that do not fit.
     """
-    ids = _by_form(plan.ids)
+    ids = _by_form((*plan.ids, *plan.inactive))
     rasters = _composed(rasters, ids)
     held = rasters.cell_ids
     if not held or any(cell_id in plan for cell_id in held):

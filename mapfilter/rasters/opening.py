@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from numbers import Real
 from pathlib import Path
 
 from mapfilter._arguments import Argument, Setting, check_arguments, path_argument
-from mapfilter.errors import Faults, InputError, fail
+from mapfilter.errors import Fault, Faults, InputError, fail, listed
 from mapfilter.geodesy import projected_crs
 from mapfilter.radio.cell_rules import id_fault
 from mapfilter.rasters.ascii_grids import open_ascii_grid
@@ -43,6 +43,8 @@ FORMATS: Mapping[str, Opener] = {
 }
 """Formats of raster files by suffix. A new one needs its module and a line here."""
 _MOST_FILES = 100_000
+_FEW_FILES = 3
+"""Files with the same fault are told one by one; of more the first ones are named."""
 
 
 def open_rasters(
@@ -110,11 +112,13 @@ def open_rasters(
     elif path.is_dir():
         sources = [(file, None) for file in _listed(path)]
     faults, notes, files = Faults(), list[str](), list[RasterFile]()
+    wrong: list[tuple[Path, Fault]] = []
     for source, row in sources:
         try:
             files.append(_open(source, declared, row, notes))
         except InputError as error:
-            faults.found.extend(error.faults)
+            wrong += [(source, fault) for fault in error.faults]
+    faults.found.extend(_shared(path, wrong, len(sources)))
     faults.raise_if_any(InputError)
     files = _named_by_file(files, notes)
     _check_ids(path, files)
@@ -190,6 +194,33 @@ def _open(path: Path, declared: Declared, row: IndexRow | None, notes: list[str]
         notes.append(note)
     faults.raise_if_any(InputError)
     return replace(file, cell_ids=(row.cell_id,), described=False)
+
+
+def _shared(path: Path, wrong: Sequence[tuple[Path, Fault]], count: int) -> Iterator[Fault]:
+    """Yield the faults of files, each once that several files share.
+
+    Parameters
+    ----------
+    path : Path
+        The folder or index of the files.
+    wrong : sequence of (Path, Fault)
+        Each fault with its file.
+    count : int
+        Of all files.
+    """
+    alike: dict[tuple[str, str, str], list[tuple[Path, Fault]]] = {}
+    for file, fault in wrong:
+        part = fault.where.removeprefix(str(file))
+        alike.setdefault((part, fault.expected, fault.hint), []).append((file, fault))
+    for (part, _, _), found in alike.items():
+        file, fault = found[0]
+        if len(found) <= _FEW_FILES:
+            yield from (one for _, one in found)
+            continue
+        names = listed([one.name for one, _ in found], _FEW_FILES)
+        own = "" if len({one.got for _, one in found}) == 1 else f" in {file.name}"
+        where = f"{path}, {len(found)} of {count} rasters ({names}){part}"
+        yield replace(fault, where=where, got=f"{fault.got}{own}")
 
 
 def _named_by_file(files: list[RasterFile], notes: list[str]) -> list[RasterFile]:

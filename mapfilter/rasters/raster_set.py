@@ -214,6 +214,21 @@ def in_other_case(unknown: Sequence[str], missing: Sequence[str]) -> str:
     return f"names differ in upper and lower case only: raster {name!r}, cell {cell_id!r}{others}"
 
 
+def switched_off(unknown: Sequence[str], plan: CellPlan) -> str:
+    """Return which rasters without a cell are of cells that the plan switches off, or "".
+
+    Examples
+    --------
+    >>> switched_off(["S1B", "X"], CellPlan("EPSG:32635", (), inactive=("S1B", "S1C")))
+    'the plan has S1B, but switched off: switch it on, or take its raster out'
+    """
+    off = [name for name in unknown if name in plan.inactive]
+    if not off:
+        return ""
+    them, its = ("it", "its raster") if len(off) == 1 else ("them", "their rasters")
+    return f"the plan has {listed(off)}, but switched off: switch {them} on, or take {its} out"
+
+
 def _several_of_one(unknown: Sequence[str], missing: Sequence[str]) -> str:
     """Return that several rasters have the name of one cell in theirs, or ""."""
     for cell_id in missing[:_TRIED]:
@@ -232,7 +247,8 @@ def check_against_plan(rasters: RxLevRasters, plan: CellPlan) -> None:
     faults, held = Faults(), set(rasters.cell_ids)
     unknown = [cell_id for cell_id in rasters.cell_ids if cell_id not in plan]
     missing = [cell_id for cell_id in plan.ids if cell_id not in held]
-    hint = in_other_case(unknown, missing) or _several_of_one(unknown, missing)
+    hint = switched_off(unknown, plan)
+    hint = hint or in_other_case(unknown, missing) or _several_of_one(unknown, missing)
     hint = hint or "rasters and plan of different dates or places"
     if unknown:
         got = listed([repr(one) for one in unknown])

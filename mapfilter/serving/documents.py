@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection, Mapping
 from difflib import get_close_matches
 from math import isfinite
@@ -13,7 +14,7 @@ from mapfilter.errors import Fault, Faults, InputError, fail
 BODY = "body"
 """Name of the whole request body in messages."""
 
-_SHOWN_FAULTS = 20
+_SHOWN_FAULTS, _SHOWN = 20, 60
 
 
 class RequestError(Exception):
@@ -102,6 +103,20 @@ def type_name(value: object) -> str:
     return "null" if value is None else names.get(type(value), "a number")
 
 
+def as_json(value: object) -> str:
+    """Return a value of a request as messages show it: as in JSON, and not too long.
+
+    Examples
+    --------
+    >>> as_json(None), as_json([True, 1.5]), as_json("a")
+    ('null', '[true, 1.5]', "'a'")
+    """
+    if isinstance(value, bool | list | dict) or value is None:
+        text = json.dumps(value, ensure_ascii=False)
+        return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
+    return shown(value)
+
+
 def check_keys(
     given: Mapping[str, Any], known: Collection[str], where: str, faults: Faults
 ) -> None:
@@ -132,9 +147,9 @@ def number(
             found = float("inf")
         if isfinite(found) and low <= found <= high:
             return found
-        faults.add(where, expected, shown(value), hint)
+        faults.add(where, expected, as_json(value), hint)
         return None
-    faults.add(where, expected, shown(value))
+    faults.add(where, expected, as_json(value))
     return None
 
 
@@ -156,9 +171,9 @@ def whole(
     if isinstance(value, int) and not isinstance(value, bool):
         if low <= value <= high:
             return value
-        faults.add(where, expected, shown(value), hint)
+        faults.add(where, expected, as_json(value), hint)
         return None
-    faults.add(where, expected, shown(value))
+    faults.add(where, expected, as_json(value))
     return None
 
 
@@ -166,7 +181,7 @@ def text(value: object, where: str, expected: str, faults: Faults, most: int = 1
     """Return a text of printable characters that is not empty; None, with a fault, otherwise."""
     if isinstance(value, str) and 0 < len(value) <= most and value.isprintable():
         return value
-    faults.add(where, expected, shown(value))
+    faults.add(where, expected, as_json(value))
     return None
 
 

@@ -19,6 +19,7 @@ from mapfilter.radio.identities import technology as technology_of
 from mapfilter.radio.plan_names import PlanNames, ReportedCell
 from mapfilter.serving.documents import (
     RequestError,
+    as_json,
     check_keys,
     number,
     one_fault,
@@ -203,7 +204,7 @@ def _value(column: Column, value: object, where: str, faults: Faults) -> Any:
         return missing if found is None else found
     if value in MISSING_SIGNS:
         hint = "a sign for a missing value; leave the field out"
-        faults.add(where, column.expected, shown(value), hint)
+        faults.add(where, column.expected, as_json(value), hint)
         return missing
     least, most = column.low, column.high
     likely = column.hint

@@ -10,14 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from mapfilter._inputs import shown
 from mapfilter.errors import Faults
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.log_options import LogStatement, fitted_to_statement, has_default
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.identities import TIMING_STEP_M
-from mapfilter.serving.documents import check_keys, number
+from mapfilter.serving.documents import as_json, check_keys, number
 from mapfilter.serving.watching import Watcher
 
 LOG = "log"
@@ -121,12 +120,12 @@ def statement_of(given: object, faults: Faults) -> LogStatement:
     technology, step_db, vehicle = (given.get(name) for name in _fields())
     if technology is not None and technology not in list(TIMING_STEP_M):
         expected = " or ".join(TIMING_STEP_M)
-        faults.add(f"{LOG}.technology", expected, shown(technology), "of timing advances")
+        faults.add(f"{LOG}.technology", expected, as_json(technology), "of timing advances")
     if step_db is not None:
         where, expected = f"{LOG}.level_step_db", f"dB in 0..{_MOST_STEP_DB:g}"
         step_db = number(step_db, where, expected, faults, 0.0, _MOST_STEP_DB)
     if vehicle is not None and not isinstance(vehicle, bool):
-        faults.add(f"{LOG}.vehicle", "true or false", shown(vehicle))
+        faults.add(f"{LOG}.vehicle", "true or false", as_json(vehicle))
     if len(faults.found) > before:
         return _USUAL
     return LogStatement(technology, round(step_db or 0.0, _STEP_DIGITS), vehicle)

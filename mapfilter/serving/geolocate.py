@@ -21,7 +21,15 @@ from mapfilter.positioning.fingerprints.reports import Reports, make_reports
 from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.identities import LIMITS, technology
 from mapfilter.radio.plan_names import PlanNames, ReportedCell
-from mapfilter.serving.documents import RequestError, check_keys, number, rows_of, text, whole
+from mapfilter.serving.documents import (
+    RequestError,
+    as_json,
+    check_keys,
+    number,
+    rows_of,
+    text,
+    whole,
+)
 from mapfilter.tracks.schema import NEIGHBOUR, SERVING
 
 _MOST = 100
@@ -211,7 +219,7 @@ def _radio_type(value: object, where: str, faults: Faults) -> str | None:
         return None
     family = technology(value) if isinstance(value, str) else None
     if family is None:
-        faults.add(where, "gsm, wcdma, lte or nr", repr(value)[:60])
+        faults.add(where, "gsm, wcdma, lte or nr", as_json(value))
     return family
 
 

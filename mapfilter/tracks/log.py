@@ -25,6 +25,7 @@ from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import projected_crs, short_crs
 from mapfilter.gnss.almanacs import Almanac
 from mapfilter.gnss.broadcast import UNPLACED
+from mapfilter.tracks.checks.beyond_crs import check_metres
 from mapfilter.tracks.checks.clock_steps import with_clocks_gone_on
 from mapfilter.tracks.checks.log_checks import (
     TIMES_BEGIN,
@@ -47,6 +48,7 @@ from mapfilter.tracks.joining.moved import UNDIRECTED
 from mapfilter.tracks.log_times import seconds_of_tables
 from mapfilter.tracks.satellites import place_satellites
 from mapfilter.tracks.schema import PLACE, TABLES
+from mapfilter.tracks.stated_crs import placed_in
 from mapfilter.tracks.tables import tidy_table
 
 _PLACED = ("gnss", "truth")
@@ -195,7 +197,7 @@ def make_log(
         With every fault: NaN or infinity in times or coordinates, text for numbers, values out of
         their range, columns missing or misspelt, milliseconds for seconds, degrees for metres or
         for radians, steps that are none, raw RXLEV for dBm, a CRS that is not projected, or whose
-        metres are none on the ground at positions in degrees, tables that do not overlap in time, a
+        metres are none on the ground at the positions, tables that do not overlap in time, a
         start outside the years 1 to 9999, an almanac of another time, or one without a start.
     ConfigError
         An argument that is no table is of another type.
@@ -259,6 +261,9 @@ def make_log(
             every_note += levels_note(tables["radio"], called.get("radio", "radio"))
         if not any(TIMES_BEGIN in note for note in every_note):
             every_note += odd_start(start_utc_s, tables, whole)
+        for name in _PLACED if not faults.found else ():
+            east_m, north_m = tables[name][["east_m", "north_m"]].to_numpy(np.float64).T
+            check_metres(called.get(name, name), str(crs), east_m, north_m, faults)
         if not faults.found and not any(FAR_APART in note for note in every_note):
             every_note += truth_far_off(str(crs), tables)
         # Of values that are refused nothing is told besides.
@@ -281,5 +286,6 @@ def make_log(
         tables["pseudoranges"], more = place_satellites(rows, almanac, start_utc_s, where)
         every_note += more
     every_note = tuple(dict.fromkeys(every_note))
+    tables |= {name: placed_in(str(crs), tables[name]) for name in _PLACED}
     moved = None if vehicle is None else bool(vehicle)
     return TrackLog(str(crs), start_utc_s, **tables, notes=every_note, imu=imu, vehicle=moved)

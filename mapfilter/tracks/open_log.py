@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from mapfilter.errors import InputError, noted
+from mapfilter.geodesy import projected_crs
 from mapfilter.radio.cells import CellPlan
+from mapfilter.tracks.checks.placeless import in_frame
 from mapfilter.tracks.joining.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.motion_factors import scaled_log
@@ -46,16 +48,18 @@ def open_log(
 ) -> OpenedLog:
     """Open a track log, or the recordings of one journey by other programs.
 
-    Nothing is written. A track log is read as it is; recordings are read, aligned and joined as
-    ``mapfilter convert`` does. Notes of the log say what of each recording was not used.
+    Nothing is written. A track log is read as it is, but for its CRS; recordings are read, aligned
+    and joined as ``mapfilter convert`` does. Notes of the log say what of each recording was not
+    used.
 
     Parameters
     ----------
     paths : path, or sequence of paths
         A track log; or recordings, or a folder or ZIP of them, of one journey.
     crs : str
-        Projected CRS for recordings: that of the database. "" for the UTM zone of their positions.
-        A track log keeps its own.
+        Projected CRS of the log: that of the database. "" for the UTM zone of the positions of
+        recordings, and a track log's own. A track log of another one is projected, see
+        :func:`mapfilter.tracks.checks.placeless.in_frame`.
     plan : CellPlan, optional
         Gives reported cells its ids, see :func:`mapfilter.tracks.joining.identify.name_by_plan`.
     options : OpenOptions, optional
@@ -77,6 +81,7 @@ def open_log(
         unused += () if walk is None else without_effect(walk, (), _READY)
         sensors, cut = sensors_of(given[0])
         log = replace(log, notes=(*log.notes, *unused, *cut)) if unused or cut else log
+        log = in_frame(log, projected_crs(crs), options.combine.about_deg) if crs else log
         opened = OpenedLog(given[0].name, log, sensors)
     else:
         # Here, as a track log needs none of what reads and joins recordings.

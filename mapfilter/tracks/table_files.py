@@ -17,7 +17,7 @@ import pyarrow.csv as arrow_csv
 
 from mapfilter._arrow import arrow_bytes, open_parquet
 from mapfilter._cut_ends import without_cut_row, without_zero_end
-from mapfilter._inputs import open_input, read_input, wide_encoding
+from mapfilter._inputs import first_foreign_byte, open_input, read_input, wide_encoding
 from mapfilter._separator_line import without_separator_line
 from mapfilter._types import Ints
 from mapfilter.errors import InputError, fail, listed
@@ -46,7 +46,8 @@ class ReadTable(NamedTuple):
 def read_table(table: str, path: Path) -> ReadTable:
     """Read one of :data:`mapfilter.tracks.schema.TABLES` from CSV or Parquet.
 
-    CSV is UTF-8 with commas, semicolons or tabs; decimal commas where commas separate nothing.
+    CSV is UTF-8, else Windows-1252 with a note, with commas, semicolons or tabs; decimal commas
+    where commas separate nothing.
 
     Raises
     ------
@@ -91,6 +92,8 @@ def _read_csv(table: str, path: Path) -> ReadTable:
     data = read_input(path, _LARGEST_BYTES, "a table").removeprefix(codecs.BOM_UTF8)
     _check_encoding(path, data.rstrip(b"\0"))
     data, zeros = without_zero_end(data)
+    if (foreign := first_foreign_byte(data)) >= 0:
+        data = data.decode("cp1252").encode()
     if zeros and not data:
         raise fail(InputError, str(path), "a header line", "zero bytes only", "cut off")
     data = without_separator_line(data)
@@ -127,6 +130,7 @@ def _read_csv(table: str, path: Path) -> ReadTable:
         for name in rows.columns[~rows.columns.isin(texts)]:
             rows[name] = rows[name].str.replace(_DECIMAL_COMMA, r"\1.\2", regex=True)
     notes = [f"{path}: {zeros}"] if zeros else []
+    notes += [f"{path}: no UTF-8 (byte {foreign}); read as Windows-1252"] if foreign >= 0 else []
     if cut:
         ends = data.count(b"\n") or data.count(b"\r")
         notes.append(f"{path} row {ends + 1}: {cut}, left out")

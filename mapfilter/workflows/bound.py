@@ -25,7 +25,7 @@ from mapfilter.radio.layers import layer_numbers
 from mapfilter.report.basemap import BaseMap
 from mapfilter.report.coverage import plot_point_values, plot_twins
 from mapfilter.report.saving import save
-from mapfilter.workflows.inputs.apart import check_out_apart
+from mapfilter.workflows.inputs.apart import check_in_no_store, check_out_apart
 
 NOTES = (
     "exact for the error model: the bound from given gradients; bits by the serving cell",
@@ -99,6 +99,7 @@ def run_bound(
     """Compute bounds on positioning by a database; write a raster, tables by way and of twins."""
     began_s = time.perf_counter()
     check_out_apart(out, [path])
+    check_in_no_store(out)
     database = open_database(path)
     with nothing_left(out):
         ensure_writable_folder(out)

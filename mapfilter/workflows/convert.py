@@ -14,7 +14,7 @@ from mapfilter._words import number_of
 from mapfilter.errors import ConfigError, OutputError, fail, noted
 from mapfilter.geodesy import short_crs
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.joining.combine import combine
+from mapfilter.tracks.joining.combine import Combined, combine
 from mapfilter.tracks.joining.recordings import read_recordings, with_measured, with_remarks
 from mapfilter.tracks.open_options import OpenOptions
 from mapfilter.tracks.readers.recorded.recording import Recording
@@ -23,6 +23,8 @@ from mapfilter.tracks.store import check_log_replaceable, write_log
 
 _GAP_FACTOR = 5.0
 _LEAST_GAP_S = 2.0
+_OF_STEPS = {"accelerometer", "linear_acceleration", "steps"}
+"""Sensors that steps are made of."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +91,8 @@ def run_convert(files: Sequence[Path], out: Path, options: OpenOptions | None = 
     of_files = (remark for recording in recordings for remark in recording.remarks)
     with noted((*notes, *of_files)):
         combined = combine(recordings, with_measured(options.combine, files))
+    if options.combine.walk is None:
+        notes += _no_steps_note(combined)
     # People are shown those of each file beneath it; the log has nothing but its notes.
     write_log(with_remarks(combined.log, notes, recordings), out, sensors=combined.sensors)
     rows = {table: len(getattr(combined.log, table)) for table in TABLES}
@@ -108,6 +112,16 @@ def run_convert(files: Sequence[Path], out: Path, options: OpenOptions | None = 
         (*notes, *combined.log.notes),
         combined.log.imu,
     )
+
+
+def _no_steps_note(combined: Combined) -> tuple[str, ...]:
+    """Return a note where no steps would have been made either, and why."""
+    why = ""
+    if len(combined.log.motion):
+        why = "motion is made of no phone's sensors anyway"
+    elif not _OF_STEPS.intersection(combined.sensors):
+        why = "there are no sensors of a phone to make steps of"
+    return (f"--no-steps has no effect: {why}",) if why else ()
 
 
 def _check_out(out: Path, inputs: Sequence[Path]) -> None:

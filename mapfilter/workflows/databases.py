@@ -14,7 +14,7 @@ from mapfilter.database.merge import merge
 from mapfilter.database.merge_notes import merge_notes
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, fail
-from mapfilter.workflows.inputs.apart import check_out_apart
+from mapfilter.workflows.inputs.apart import check_in_no_store, check_out_apart
 
 
 def run_merge(
@@ -52,6 +52,7 @@ def run_export(database: Path, to: Path) -> dict[str, Any]:
         expected = "a name that ends in .gpkg or .tif"
         raise fail(ConfigError, f"--to {to}", expected, to.suffix or "no suffix")
     check_out_apart(to, [database], "--to")
+    check_in_no_store(to, "--to")
     opened = open_database(database, verify="full")
     if kind == ".gpkg":
         export_geopackage(opened, to)

@@ -15,6 +15,7 @@ from mapfilter.report.film import FilmMoment, FilmTrack, write_film
 from mapfilter.report.track_marks import bounds_about
 from mapfilter.viewing.arrays import unpacked
 from mapfilter.viewing.page import read_page
+from mapfilter.workflows.inputs.apart import check_in_no_store
 from mapfilter.workflows.views import pages_of
 
 MOST_PICTURES = 240
@@ -51,6 +52,7 @@ def run_film(
     """
     if not 1 <= pictures <= MOST_PICTURES:
         raise fail(ConfigError, "--pictures", f"1 to {MOST_PICTURES}", pictures)
+    check_in_no_store(out)
     page = pages_of([result])[0]
     bundle = read_page(page)
     try:

@@ -34,7 +34,11 @@ from mapfilter.report.saving import save
 from mapfilter.tracks.checks.misplaced import check_near
 from mapfilter.tracks.checks.placeless import is_local_frame
 from mapfilter.tracks.open_options import OpenOptions
-from mapfilter.workflows.inputs.apart import check_inputs_kept, check_out_apart
+from mapfilter.workflows.inputs.apart import (
+    check_in_no_store,
+    check_inputs_kept,
+    check_out_apart,
+)
 from mapfilter.workflows.inputs.fingerprints import WITHOUT_STEPS, read_database, read_reports
 from mapfilter.workflows.outputs.result_text import to_jsonable
 from mapfilter.workflows.outputs.results import (
@@ -126,6 +130,7 @@ def run_locate(
     """
     began_s = time.perf_counter()
     check_out_apart(out, [database, log])
+    check_in_no_store(out)
     check_figures_of_reports(out)
     written = [out / name for name in (POSITIONS, FIGURES, PICTURE_OF_REPORTS)]
     check_inputs_kept([database, log, *truth], written)

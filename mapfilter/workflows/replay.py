@@ -20,7 +20,12 @@ from mapfilter.errors import ConfigError, fail, noted
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.filter import FilterOptions
 from mapfilter.positioning.kalman.filter import KalmanFilter
-from mapfilter.workflows.inputs.apart import check_inputs_kept, check_out_apart, named_inputs
+from mapfilter.workflows.inputs.apart import (
+    check_in_no_store,
+    check_inputs_kept,
+    check_out_apart,
+    named_inputs,
+)
 from mapfilter.workflows.inputs.filter_choice import filter_choice
 from mapfilter.workflows.kernels import compiled_beside
 from mapfilter.workflows.outputs.result_text import to_jsonable
@@ -88,6 +93,7 @@ def run_replay(
         check_out_apart(folder, [*own, *journeys.paths, *config.track.recordings])
         check_figures_of_replay(folder)
         check_inputs_kept([*journeys.paths, *named_inputs(config)], replaced_by_replay(folder))
+    check_in_no_store(out)
     if not filters.has_sites:
         journeys.check_siteless()
     journeys.check(None if database is None else database.lattice)

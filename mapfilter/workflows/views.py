@@ -22,7 +22,7 @@ from mapfilter.viewing.bundle import database_bundle
 from mapfilter.viewing.layers import frame_of, with_bound, with_buildings
 from mapfilter.viewing.merge import side_by_side
 from mapfilter.viewing.page import read_page, write_page
-from mapfilter.workflows.inputs.apart import check_out_apart
+from mapfilter.workflows.inputs.apart import check_in_no_store, check_out_apart
 from mapfilter.workflows.outputs.results import REPLAY_HTML
 
 VIEW_HTML = "view.html"
@@ -66,6 +66,7 @@ def run_view(
     """
     file = (out or Path(VIEW_HTML)).absolute()
     check_out_apart(file, [path for path in paths if (path / MANIFEST).is_file()])
+    check_in_no_store(file)
     bounds = [path for path in paths if (path / BOUND_TIF).is_file()]
     rest = [path for path in paths if path not in bounds]
     if len(rest) == 1 and (rest[0] / MANIFEST).is_file():

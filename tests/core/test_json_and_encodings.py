@@ -16,6 +16,7 @@ from mapfilter.errors import MapfilterError, StoreError
 from mapfilter.radio.tables import read_table as read_plan_table
 from mapfilter.survey.measurement_files import DIALECTS, read_csv
 from mapfilter.tracks.readers.texts.text import read_text
+from mapfilter.tracks.store import read_log
 from mapfilter.tracks.table_files import read_table
 
 UTF_32 = ["utf-32-le", "utf-32-be"]
@@ -137,3 +138,16 @@ def test_one_whole_letter_tells_utf_8_from_windows_1252(data, place, tmp_path):
             assert word in text
             header = read_plan_table(file, "a cell plan").header
             assert any(word in name for name in header)
+
+
+@pytest.mark.parametrize("separator", [",", ";"])
+def test_tables_of_a_log_in_windows_1252_are_read_with_a_note(separator, tmp_path):
+    (tmp_path / "log.json").write_text('{"crs": "EPSG:32635"}')
+    rows = ["time_s,role,cell,level_dbm", *(f"{n},serving,Münster-Süd,-70" for n in range(3)), ""]
+    text = "\n".join(rows).replace(",", separator)
+    (tmp_path / "radio.csv").write_bytes(text.encode("cp1252"))
+    log = read_log(tmp_path)
+    assert log.radio["cell"].tolist() == ["Münster-Süd"] * 3
+    assert log.notes == (f"{tmp_path / 'radio.csv'}: no UTF-8 (byte 38); read as Windows-1252",)
+    (tmp_path / "radio.csv").write_bytes(text.encode())
+    assert read_log(tmp_path).notes == ()

@@ -38,7 +38,7 @@ def results(tmp_path_factory):
 
 CHANGED = {
     "track": {"filter": "other"},
-    "positioned": {"filter_s": -1.0},
+    "positioned": {"snapshots": ()},
     "snapshot": {"weight": np.zeros(3)},
     "output": {"unused": ("other",)},
     "fix": {"radii_m": np.zeros(3)},
@@ -72,3 +72,8 @@ def test_two_runs_of_a_seed_are_equal_and_of_another_not(results, tmp_path):
     log = mf.make_log(database.lattice.crs, **made)
     assert mf.locate(log, database, SMALL).estimate == results["track"]
     assert mf.locate(log, database, SMALL, seed=1).estimate != results["track"]
+
+
+def test_a_track_is_the_same_however_long_it_took(results):
+    found = results["positioned"]
+    assert replace(found, filter_s=found.filter_s + 1.0) == found

@@ -106,3 +106,19 @@ def test_the_place_of_a_satellite_may_be_an_array(kind):
 def test_kinds_of_a_journey_are_those_of_logs(database, name, kinds, found):
     with pytest.raises(mf.MapfilterError, match=f"^kinds: expected a collection .*, found {found}"):
         FILTERS[name].over(database).begin(kinds)
+
+
+def test_times_that_go_backwards_are_refused(positioner):
+    rng, state = np.random.default_rng(0), positioner.begin()
+    for time_s in (10.0, 11.0, 11.0):
+        state, _ = positioner.step(state, replace(EPOCH, time_s=time_s), rng)
+    told = r"^epoch, time_s: expected 11.0 or later, as the epoch before is of that .*, found 10.5"
+    with pytest.raises(mf.MapfilterError, match=told):
+        positioner.step(state, replace(EPOCH, time_s=10.5), rng)
+
+
+def test_times_count_before_anything_is_located(positioner):
+    rng, empty = np.random.default_rng(0), mf.Epoch(10.0)
+    state, _ = positioner.step(positioner.begin(), empty, rng)
+    with pytest.raises(mf.MapfilterError, match=r"^epoch, time_s: expected 10.0 or later, "):
+        positioner.step(state, mf.Epoch(9.0), rng)

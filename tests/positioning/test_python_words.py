@@ -50,7 +50,7 @@ def test_every_option_that_these_rooms_name_has_words_of_python():
         ("--column FIELD=COLUMN, such as", 'columns={"FIELD": "COLUMN"}, such as'),
         ("not used: acc; see --column", "not used: acc; see columns"),
         ("--offset a.csv=18 for", 'offsets_s={"a.csv": 18} for'),
-        ("mapfilter convert --offset b.csv=SECONDS, the", 'offsets_s={"b.csv": SECONDS}, the'),
+        ("--offset b.csv=SECONDS, the", 'offsets_s={"b.csv": SECONDS}, the'),
         ("give --zone or --offset", "give zone or offsets_s"),
         ("and --origin LAT,LON of its", "and origin_deg=(LAT, LON) of its"),
         ("use --format gpx, or none", 'use format="gpx", or none'),

@@ -80,11 +80,20 @@ def test_all_wrong_options_are_told_together(walk):
     assert len(refused.value.faults) == 3
 
 
-def test_a_track_log_keeps_its_crs_and_says_so(walk, tmp_path):
+def test_a_track_log_is_projected_and_says_so(walk, tmp_path):
     mf.write_log(mf.read_log(walk), tmp_path / "log")
-    other = mf.read_log(tmp_path / "log", crs="EPSG:3067")
-    assert other.crs == "EPSG:32635"
-    assert other.notes == ("crs = EPSG:3067 has no effect: a track log is in its own, EPSG:32635",)
+    other = mf.read_log(tmp_path / "log", crs="EPSG:3879")
+    assert other.crs == "EPSG:3879"
+    assert other.notes == ("projected from EPSG:32635 to EPSG:3879: positions",)
+    placed = mf.read_log(walk, crs="EPSG:3879")
+    np.testing.assert_allclose(other.fixes_m, placed.fixes_m, atol=1e-6)
     for crs in ("", "EPSG:32635", "+proj=utm +zone=35 +datum=WGS84"):
         assert mf.read_log(tmp_path / "log", crs=crs).notes == ()
-    assert mf.read_log(walk, crs="EPSG:3067").notes == ()
+    assert placed.notes == ()
+
+
+def test_a_local_frame_keeps_its_metres_and_says_so(room, tmp_path):
+    mf.write_log(mf.read_log(room), tmp_path / "log")
+    own = mf.read_log(tmp_path / "log", crs="EPSG:3879")
+    told = "crs = EPSG:3879 has no effect: the track log is in a local frame"
+    assert own.notes[-1] == told

@@ -360,3 +360,46 @@ def test_a_plan_is_gone_over_by_its_ids():
     assert list(plan) == ["A", "B"]
     assert [plan[cell_id].id for cell_id in plan if cell_id in plan] == list(plan.ids)
     assert dict.fromkeys(plan, 0) == {"A": 0, "B": 0}
+
+
+FEET = "EPSG:2263"
+"""New York Long Island, in US survey feet."""
+
+
+def _plan_in(crs: str, rows: int, folder: Path) -> CellPlan:
+    lon, lat = -73.98 + 0.001 * np.arange(rows), np.full(rows, 40.75)
+    east, north = project(crs, lon, lat)
+    lines = ["cell,east,north,crs,height_m,eirp_dbm,frequency_mhz"]
+    lines += [f"A{n},{east[n]:.4f},{north[n]:.4f},{crs},30,50,1800" for n in range(rows)]
+    (folder / "cells.csv").write_text("\n".join([*lines, ""]))
+    return read_cell_plan(folder / "cells.csv", "EPSG:32618")
+
+
+def test_a_plan_in_feet_is_converted_and_says_so(tmp_path: Path) -> None:
+    plan = _plan_in(FEET, 5, tmp_path)
+    lon, lat = unproject(
+        "EPSG:32618", [c.east_m for c in plan.cells], [c.north_m for c in plan.cells]
+    )
+    np.testing.assert_allclose(lon, -73.98 + 0.001 * np.arange(5), atol=1e-8)
+    np.testing.assert_allclose(lat, 40.75, atol=1e-8)
+    told = "positions in US survey feet, the unit of EPSG:2263, are converted to metres"
+    assert plan.notes == (told,)
+
+
+def test_metres_in_a_crs_of_feet_are_told(tmp_path: Path) -> None:
+    east, north = (0.3048 * float(one) for one in project("EPSG:2225", -122.0, 41.0))
+    (tmp_path / "cells.csv").write_text(
+        "cell,east,north,crs,height_m,eirp_dbm,frequency_mhz\n"
+        f"A,{east},{north},EPSG:2225,30,50,1800\n"
+    )
+    told = "expected US survey feet where EPSG:2225 is used, .* (likely: metres given for US"
+    with pytest.raises(InputError, match=told.replace("(", r"\(")):
+        read_cell_plan(tmp_path / "cells.csv", "EPSG:32610")
+
+
+@pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:99999", "EPSG:2053"])
+def test_a_crs_that_cannot_be_used_is_told_once(tmp_path: Path, crs: str) -> None:
+    rows = "".join(f"A{n},1,1,{crs},30,50,1800\n" for n in range(40))
+    said = _complaint(tmp_path, "cell,east,north,crs,height_m,eirp_dbm,frequency_mhz\n" + rows)
+    assert said.count("\n") == 0
+    assert "cells.csv, crs (40 rows): expected" in said

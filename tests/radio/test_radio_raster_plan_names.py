@@ -146,3 +146,19 @@ def test_tiles_of_one_cell_are_named_as_such():
     for others in (("A_1", "B_2"), ("X_1", "X_2", "X_3", "X_4")):
         with pytest.raises(InputError, match="different dates or places"):
             check_against_plan(rasters(*others), plan("A", "B"))
+
+
+def test_cells_that_the_plan_switches_off_are_told_as_that():
+    off = replace(plan("S1A"), inactive=("S1B", "S1C"))
+    findings = Findings()
+    check_ids(rasters("S1A", "S1B", "odd"), off, "cells.csv", findings)
+    (told,) = findings.result().findings
+    assert told.evidence == (
+        "2 of 3 rasters have no cell: S1B, odd. The plan has S1B, but switched off: switch it on, "
+        "or take its raster out."
+    )
+    with pytest.raises(InputError, match=r"likely: the plan has S1B, but switched off: switch it"):
+        check_against_plan(rasters("S1A", "S1B", "odd"), off)
+    # Also where files have more in their names than the cell.
+    found = named_by_plan(rasters("HDS1A_1", "HDS1B_1"), off)
+    assert found.cell_ids == ("S1A", "S1B")

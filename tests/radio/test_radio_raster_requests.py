@@ -99,6 +99,7 @@ class Plan(dict):
     """EIRP (dBm) by cell."""
 
     ids = property(tuple)
+    inactive = ()
 
     def __getitem__(self, cell):
         return SimpleNamespace(eirp_dbm=self.get(cell))

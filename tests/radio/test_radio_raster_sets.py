@@ -249,3 +249,29 @@ def test_a_raster_of_another_place_is_told(tmp_path: Path) -> None:
     swapped = replace(FINE, west_m=6673000.0, north_m=385000.0)
     _geotiff(tmp_path / "B.tif", swapped, _values(FINE))
     assert "a raster of another place" in _complaint(tmp_path, crs=None)
+
+
+@pytest.mark.parametrize("count", [3, 30])
+def test_a_fault_that_many_files_share_is_told_once(count: int, tmp_path: Path) -> None:
+    names = [f"{chr(97 + n % 26)}{'xyz'[n // 26]}" for n in range(count)]
+    for name in names:
+        _geotiff(tmp_path / f"{name}.tif", COARSE, _values(COARSE), crs="EPSG:4326", unit="dBm")
+    with pytest.raises(InputError) as caught:
+        open_rasters(tmp_path)
+    lines = str(caught.value).splitlines()
+    assert len(lines) == (3 if count == 3 else 1)
+    if count > 3:
+        three = "ax.tif, ay.tif, bx.tif and 27 more"
+        assert lines[0].startswith(f"{tmp_path}, 30 of 30 rasters ({three}), CRS: expected ")
+
+
+def test_another_fault_of_one_file_is_told_beside_that_of_many(tmp_path: Path) -> None:
+    for name in ("a", "b", "c", "d", "e"):
+        _geotiff(tmp_path / f"{name}.tif", COARSE, _values(COARSE), crs="EPSG:4326", unit="dBm")
+    (tmp_path / "f.tif").write_bytes((tmp_path / "e.tif").read_bytes()[:100])
+    with pytest.raises(InputError) as caught:
+        open_rasters(tmp_path)
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 2
+    assert "5 of 6 rasters (a.tif, b.tif, c.tif and 2 more), CRS: expected" in lines[0]
+    assert lines[1].startswith(f"{tmp_path / 'f.tif'}: expected ")

@@ -120,6 +120,35 @@ def test_epochs_with_a_fault_are_refused_with_its_place(cross, body):
 
 
 @pytest.mark.parametrize(
+    ("body", "found"),
+    [
+        ({"epochs": [{"time_s": True}]}, "true"),
+        ({"epochs": [{}]}, "null"),
+        ({"epochs": [{"time_s": [None, False]}]}, "[null, false]"),
+        (epoch(motion=[{"step_m": True}]), "true"),
+        (epoch(radio=[{**SERVING, "arfcn": False}]), "false"),
+        (epoch(radio=[{**SERVING, "cell": {"id": None}}]), '{"id": null}'),
+        (epoch(radio=[{**SERVING, "technology": True}]), "true"),
+    ],
+)
+def test_what_was_found_is_told_in_the_words_of_json(cross, body, found):
+    with pytest.raises(RequestError) as caught:
+        read_epochs(body, PlanNames(cross.plan), nan)
+    (fault,) = caught.value.faults
+    assert fault.got == found
+
+
+def test_faults_of_a_report_are_told_in_the_words_of_json(made):
+    body = {"cellTowers": [{"cellId": None}], "radioType": True}
+    answer = answer_of(made, "POST", "/v1/geolocate", body)
+    told = [one["message"] for one in answer.json["error"]["errors"]]
+    assert told == [
+        "radioType: expected gsm, wcdma, lte or nr, found true",
+        "cellTowers[0].cellId: expected a whole number in 0..68719476735, found null",
+    ]
+
+
+@pytest.mark.parametrize(
     ("body", "mistake"),
     [
         ({"epochs": [{"time_s": 1.7e12}]}, "milliseconds for s"),

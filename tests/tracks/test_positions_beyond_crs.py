@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 import mapfilter as mf
+from mapfilter.geodesy import project
 
 LAT_DEG = np.full(30, 60.2)
 LON_DEG = 25 + 1e-5 * np.arange(30)
@@ -73,6 +74,27 @@ def test_metres_of_the_world_are_none_on_the_ground(tmp_path, crs, ground_m):
             made()
         assert f"{where}{told}" in str(refused.value)
         assert f"where 100 m are {ground_m} m (likely: {hint})" in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("crs", "ground_m"), [("EPSG:3857", "50"), ("EPSG:3395", "50"), ("EPSG:6933", "57")]
+)
+@pytest.mark.parametrize("name", ["gnss", "truth"])
+def test_metres_of_the_world_given_as_metres_are_refused_alike(crs, ground_m, name):
+    places = table(LON_DEG)
+    east_m, north_m = project(crs, places["lon_deg"], places["lat_deg"])
+    rows = pd.DataFrame({"time_s": places["time_s"], "east_m": east_m, "north_m": north_m})
+    with pytest.raises(mf.MapfilterError) as refused:
+        mf.make_log(crs, **{name: rows})
+    told = f"{name}: expected positions at which metres of {crs} are metres on the ground, found 60"
+    assert told in str(refused.value)
+    hint = "at that place it is EPSG:32635, or give lat_deg and lon_deg"
+    assert f", where 100 m are {ground_m} m (likely: " in str(refused.value)
+    assert hint in str(refused.value)
+    # At the equator they are right.
+    on_equator = rows.assign(north_m=rows["north_m"] - rows["north_m"].iloc[0])
+    if crs != "EPSG:6933":
+        assert len(getattr(mf.make_log(crs, **{name: on_equator}), name)) == len(rows)
 
 
 def test_a_single_position_where_metres_are_none_is_no_fault():

@@ -107,11 +107,12 @@ def test_no_log(replay, tmp_path, world):
     assert not (tmp_path / "out").exists()
 
 
-def test_another_crs_than_the_database(log, replay):
+def test_a_wrong_crs_puts_a_log_elsewhere(log, replay):
     (log / "log.json").write_text('{"crs": "EPSG:32634"}')
     before = contents(log.parent)
-    told = "my-walk, crs: expected EPSG:32635, the database's, found EPSG:32634"
-    assert_refused(replay(log), told, "log of another area or zone")
+    told = "my-walk, truth: expected positions near the database's", "log of another area or zone"
+    note = "mapfilter: note: projected from EPSG:32634 to EPSG:32635: positions, headings by -5.2"
+    assert_refused(replay(log), note, *told)
     assert contents(log.parent) == before
 
 
@@ -124,17 +125,19 @@ def test_a_log_of_the_area_in_another_crs(log, replay):
     truth = pd.read_csv(log / "truth.csv")
     degrees = unproject("EPSG:32635", truth["east_m"], truth["north_m"])
     truth["east_m"], truth["north_m"] = project("EPSG:2393", *degrees)
+    same = assert_done(replay(log, "--json")).json
     truth.to_csv(log / "truth.csv", index=False)
     (log / "log.json").write_text('{"crs": "EPSG:2393"}')
-    told = "my-walk, crs: expected EPSG:32635, the database's, found EPSG:2393"
-    assert_refused(replay(log), told, "a log of this area; convert it again with --crs EPSG:32635")
+    found = assert_done(replay(log, "--json")).json
+    assert any(note.startswith("projected from EPSG:2393 to ") for note in found["notes"])
+    assert found["error_mean_m"] == pytest.approx(same["error_mean_m"], abs=2.0)
 
 
 def test_one_bad_log_of_many_stops_all_before_anything_is_written(own_world, replay, tmp_path):
     (own_world.journeys / "journey-0001-draw-000" / "motion.parquet").unlink()
     head = own_world.journeys / ONE / "log.json"
     head.write_text(head.read_text().replace("EPSG:32635", "EPSG:32634"))
-    told = f"{ONE}, crs", "journey-0001-draw-000/motion.parquet"
+    told = f"{ONE}, truth", "journey-0001-draw-000/motion.parquet"
     assert_refused(replay(own_world.journeys), *told)
     assert not (tmp_path / "out").exists()
 

@@ -187,6 +187,29 @@ def test_speed_and_course_become_motion_on_request(database, recordings, tmp_pat
     assert "motion comes from GNSS" in done.out
 
 
+def test_a_clock_that_is_off_is_set_by_an_offset(database, recordings, tmp_path):
+    truth = pd.read_csv(tmp_path / "truth.csv")
+    late = tmp_path / "late.csv"
+    truth.assign(time=truth["time"] + 37.0).to_csv(late, index=False)
+    right = replayed(
+        database, tmp_path / "out", "--log", recordings, "--truth", tmp_path / "truth.csv"
+    )
+    given = ("--log", recordings, "--truth", late)
+    wrong = replayed(database, tmp_path / "off", *given).json
+    assert wrong["error_mean_m"] > 20 + right.json["error_mean_m"]
+    for more in (
+        ("--offset", "late.csv=-37"),
+        ("--offset", f"{late}=-37.0"),
+        ("--set", 'track.offsets_s={"late.csv" = -37.0}'),
+    ):
+        found = replayed(database, tmp_path / "on", *given, *more).json
+        assert found["error_mean_m"] == pytest.approx(right.json["error_mean_m"], abs=1e-6)
+    refused = replayed(database, tmp_path / "no", *given, "--offset", "lat.csv=1")
+    assert_refused(refused, "--offset, track.offsets_s: expected the name of one of the recordings")
+    refused = replayed(database, tmp_path / "no", *given, "--offset", "late.csv=soon")
+    assert_refused(refused, "--offset late.csv: expected 1 number")
+
+
 def test_refusals(database, recordings, tmp_path):
     (tmp_path / "far.csv").write_text("time,lat,lon\n1777629600,48.1,11.5\n1777629601,48.1,11.6\n")
     out = tmp_path / "out"

@@ -226,3 +226,42 @@ def test_a_configuration_and_python_take_the_same_options(recording, tmp_path):
     without = load_config(tmp_path / "walk.toml", ["track.steps=false"])
     assert open_journey(without, recording, area).log.motion.empty
     assert mf.read_log(recording, walk=None).motion.empty
+
+
+@pytest.mark.parametrize(
+    ("header", "why"),
+    [
+        ("time,steps,compass_deg,latitude,longitude", ""),
+        ("time,step_m,compass_deg,latitude,longitude", "motion is made of no phone's sensors anyw"),
+        ("time,other,more,latitude,longitude", "there are no sensors of a phone to make steps of"),
+    ],
+)
+def test_no_steps_is_noted_where_there_were_none(header, why, tmp_path):
+    rows = [f"2026-05-01T10:00:{k:02d}Z,{1 + k % 2},80,60.17,24.94" for k in range(40)]
+    (tmp_path / "phone.csv").write_text("\n".join([header, *rows, ""]))
+    given = ("convert", tmp_path / "phone.csv", "--json", "--out", tmp_path / "log")
+    notes = mapfilter(*given, "--no-steps").json["notes"]
+    found = [note for note in notes if note.startswith("--no-steps has no effect: ")]
+    assert len(found) == bool(why)
+    assert all(why in note for note in found)
+    assert not any("--no-steps" in note for note in mapfilter(*given).json["notes"])
+
+
+@pytest.mark.parametrize(
+    ("time", "told"),
+    [
+        ("2026-05-01T10:00:{:02d}Z", "phone.csv UTC"),
+        ("2026-05-01T10:00:{:02d}+02:00", "phone.csv UTC"),
+        ("2026-05-01 10:00:{:02d}", ""),
+    ],
+)
+def test_a_zone_is_noted_where_no_time_is_local(time, told, tmp_path):
+    rows = [f"{time.format(k)},60.17,24.94" for k in range(40)]
+    (tmp_path / "phone.csv").write_text("\n".join(["time,latitude,longitude", *rows, ""]))
+    given = ("convert", tmp_path / "phone.csv", "--json", "--out", tmp_path / "log")
+    notes = mapfilter(*given, "--zone", "+02:00").json["notes"]
+    found = [note for note in notes if note.startswith("--zone has no effect: ")]
+    wanted = f"--zone has no effect: no times are local without a zone ({told})"
+    assert found == ([wanted] if told else [])
+    log = mf.read_log(tmp_path / "phone.csv", zone="+02:00")
+    assert any(note.startswith("zone has no effect: ") for note in log.notes) == bool(told)

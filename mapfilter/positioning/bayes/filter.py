@@ -40,7 +40,12 @@ from mapfilter.positioning.bayes.sources.usable import usable_epoch
 from mapfilter.positioning.bayes.state import BayesState, check_state, step_output
 from mapfilter.positioning.bayes.warm_up import run_kernels
 from mapfilter.positioning.bayes.weighing import Weighing
-from mapfilter.positioning.epoch_checks import check_epoch, check_generator, check_kinds_given
+from mapfilter.positioning.epoch_checks import (
+    check_epoch,
+    check_generator,
+    check_kinds_given,
+    check_later,
+)
 from mapfilter.positioning.epochs import Epoch, serving_cell
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
@@ -187,11 +192,12 @@ class BayesPositioner(Filter[BayesState]):
         Raises
         ------
         InputError
-            A value is of another type or beyond its range, such as a level of None; the state is
-            one of another area; or ``rng`` is no generator.
+            A value is of another type or beyond its range, such as a level of None; the epoch is
+            before the last one; the state is one of another area; or ``rng`` is no generator.
         """
         check_epoch(epoch)
         check_state(state, self.area)
+        check_later(epoch, state.watch.times.epoch_s)
         check_generator(rng)
         spacing_m, hold = state.particle_spacing_m, state.hold
         state = _tracked(state)

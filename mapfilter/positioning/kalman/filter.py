@@ -20,6 +20,7 @@ from mapfilter.positioning.epoch_checks import (
     check_epoch,
     check_generator,
     check_kinds_given,
+    check_later,
     check_state_kind,
 )
 from mapfilter.positioning.epochs import Epoch
@@ -127,11 +128,12 @@ class KalmanTracker(Filter[KalmanState]):
         Raises
         ------
         InputError
-            A value of the epoch is of another type or beyond its range, the state is one of another
-            filter, or ``rng`` is no generator.
+            A value of the epoch is of another type or beyond its range, it is before the last one,
+            the state is one of another filter, or ``rng`` is no generator.
         """
         check_epoch(epoch)
         check_state_kind(state, KalmanState)
+        check_later(epoch, state.time_s)
         check_generator(rng)
         work = KalmanStep(self.sites, self.method, state)
         output = StepOutput(work.take(epoch), unused=tuple(work.unused))

@@ -7,13 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from mapfilter._crs_reach import ground_m, is_on_the_ground, likely_mistake, project_within
+from mapfilter._crs_reach import (
+    ground_m,
+    is_on_the_ground,
+    is_used_at,
+    likely_mistake,
+    project_within,
+)
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import short_crs, unproject, utm_crs
 from mapfilter.tracks.readers.recorded.recording import Recording
 
+_CRS = "Web Mercator or another CRS of the world; at that place it is {}"
 _OF_PLACES = ("positions", "truth", "places", "true_places")
 
 
@@ -44,7 +51,7 @@ def without_beyond(
         within = np.flatnonzero(~beyond)
         # One of a middle latitude, on which scales depend most: a single one may be wrong.
         middle = within[np.argsort(lat_deg[within], kind="stable")[len(within) // 2]]
-        _check_ground(where, crs, float(lon_deg[middle]), float(lat_deg[middle]), faults)
+        _check_ground(where, crs, float(lon_deg[middle]), float(lat_deg[middle]), _CRS, faults)
     if not beyond.any():
         return ""
     row, count = int(np.argmax(beyond)), int(beyond.sum())
@@ -59,15 +66,29 @@ def without_beyond(
     return f"{where}: {some} left out: {short_crs(crs)} has no such places; first {found}"
 
 
-def _check_ground(where: str, crs: str, lon_deg: float, lat_deg: float, faults: Faults) -> None:
+def check_metres(where: str, crs: str, east_m: Floats, north_m: Floats, faults: Faults) -> None:
+    """Check that metres of a log are metres on the ground, as in no CRS of the world.
+
+    Places outside of the region of a CRS may be wrong otherwise, and are not judged.
+    """
+    if not east_m.size:
+        return
+    middle = np.argsort(north_m, kind="stable")[len(north_m) // 2]
+    lon_deg, lat_deg = (float(one) for one in unproject(crs, east_m[middle], north_m[middle]))
+    if is_used_at(crs, lon_deg, lat_deg):
+        _check_ground(where, crs, lon_deg, lat_deg, f"{_CRS}, or give lat_deg and lon_deg", faults)
+
+
+def _check_ground(
+    where: str, crs: str, lon_deg: float, lat_deg: float, likely: str, faults: Faults
+) -> None:
     if is_on_the_ground(crs, lon_deg, lat_deg):
         return
     name, own = short_crs(crs), f"{lat_deg:.6g}, {lon_deg:.6g}"
     expected = f"positions at which metres of {name} are metres on the ground"
     found = f"{own}, where 100 m are {ground_m(crs, lon_deg, lat_deg):.0f} m"
     zone = utm_crs((lon_deg + 180) % 360 - 180, lat_deg)
-    hint = f"Web Mercator or another CRS of the world; at that place it is {zone}"
-    faults.add(where, expected, found, hint)
+    faults.add(where, expected, found, likely.format(zone))
 
 
 def within_crs(

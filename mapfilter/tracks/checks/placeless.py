@@ -8,17 +8,9 @@ import numpy as np
 from pyproj import CRS
 
 from mapfilter.angles import wrap_rad
-from mapfilter.geodesy import (
-    grid_convergence_rad,
-    project,
-    same_crs,
-    same_grid,
-    short_crs,
-    unproject,
-)
-from mapfilter.lattice import Lattice
-from mapfilter.tracks.checks.misplaced import OTHERWISE, is_near
+from mapfilter.geodesy import grid_convergence_rad, same_grid, short_crs
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.projected import projected_log
 
 LOCAL_FRAME = "a local frame"
 LOCAL_FRAME_HINT = "convert it with --crs EPSG:CODE, and --origin LAT,LON of its own metres"
@@ -44,10 +36,11 @@ def is_local_frame(crs: str) -> bool:
 
 
 def in_frame(log: TrackLog, crs: str, about_deg: tuple[float, float] | None = None) -> TrackLog:
-    """Return a log that names no CRS and holds no positions as one in ``crs``.
+    """Return a log as one in ``crs``, with a note where it states another one.
 
-    So is one whose CRS has the same metres, such as that of WGS 84 for that of ETRS89 in one UTM
-    zone. Other logs are returned as they are.
+    One whose CRS has the same metres, such as that of WGS 84 for that of ETRS89 in one UTM zone,
+    keeps its numbers. One of another CRS is projected. One that names none is taken to be in
+    ``crs`` where it holds no positions, else it is returned as it is.
 
     Parameters
     ----------
@@ -55,12 +48,22 @@ def in_frame(log: TrackLog, crs: str, about_deg: tuple[float, float] | None = No
     crs : str
         Projected CRS of the area.
     about_deg : (float, float) or None
-        Latitude and longitude of the area. North of a local frame is true north, from which
-        headings are turned to that of ``crs`` there; None leaves them as they are.
+        Latitude and longitude of the area, where headings of a log without positions are turned.
+        North of a local frame is true north. None leaves headings of a local frame as they are, and
+        such logs of another CRS in it.
+
+    Raises
+    ------
+    InputError
+        ``crs`` covers none of the positions of a table.
     """
-    if log.crs != crs and same_grid(log.crs, crs):
+    if log.crs == crs:
+        return log
+    if same_grid(log.crs, crs):
         return replace(log, crs=crs)
-    if not is_local_frame(log.crs) or not (log.truth.empty and log.gnss.empty):
+    if not is_local_frame(log.crs):
+        return projected_log(log, crs, about_deg)
+    if not (log.truth.empty and log.gnss.empty):
         return log
     note = f"no positions in the log: taken to be in {short_crs(crs)}"
     motion = log.motion
@@ -70,14 +73,3 @@ def in_frame(log: TrackLog, crs: str, about_deg: tuple[float, float] | None = No
         angle = f"{abs(np.degrees(turned_rad)):.1f} degrees"
         note += f", headings by its grid convergence there, {angle}"
     return replace(log, crs=crs, motion=motion, notes=(*log.notes, note))
-
-
-def elsewhere_by(log: TrackLog, lattice: Lattice) -> str:
-    """Return why a log most likely is not in a database's area: its CRS, else its place."""
-    if same_crs(log.crs, lattice.crs):
-        return OTHERWISE
-    for places in (log.truth, log.gnss):
-        degrees = unproject(log.crs, places["east_m"].to_numpy(), places["north_m"].to_numpy())
-        if is_near(*project(lattice.crs, *degrees), lattice):
-            return f"a log of this area; convert it again with --crs {short_crs(lattice.crs)}"
-    return OTHERWISE

@@ -137,9 +137,7 @@ def _offset(recording: Recording, given: Recording, late_s: float) -> tuple[floa
         return shift, f"{shift:+.1f} s, by speeds (correlation {correlation:.2f})"
     expected = f"positions or speeds in common with {first.path.name}"
     got = f"times in {clock}, and none"
-    hint = (
-        f"mapfilter convert --offset {recording.path.name}=SECONDS, the seconds to add to its times"
-    )
+    hint = f"--offset {recording.path.name}=SECONDS, the seconds to add to its times"
     hint += " (Unix time of its time 0)" if first.clock.absolute else ""
     raise fail(InputError, str(recording.path), expected, got, hint)
 

@@ -46,7 +46,15 @@ def read_recordings(
     if reading.shared and not faults.found:
         _check_named(recordings, options.columns, faults)
     faults.raise_if_any(InputError)
-    return recordings, notes
+    return recordings, (*notes, *_zone_note(options.zone, recordings))
+
+
+def _zone_note(zone: str, recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """Return a note on a zone that no recording needed; none without one."""
+    if not zone or any(one.clock.kind == "local" and one.clock.zone for one in recordings):
+        return ()
+    clocks = listed([f"{one.path.name} {one.clock}" for one in recordings], 3)
+    return (f"--zone has no effect: no times are local without a zone ({clocks})",)
 
 
 def _check_named(

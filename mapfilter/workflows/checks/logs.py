@@ -8,19 +8,14 @@ from mapfilter._words import number_of
 from mapfilter.check.findings import Findings, Severity
 from mapfilter.config.sections import Config
 from mapfilter.errors import MapfilterError, listed
-from mapfilter.geodesy import same_crs, short_crs
+from mapfilter.geodesy import same_crs
 from mapfilter.lattice import Lattice, outside_m
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.checks.foreign_cells import other_networks
 from mapfilter.tracks.checks.misplaced import AWAY_M
 from mapfilter.tracks.checks.motion_fault import fault_notes
-from mapfilter.tracks.checks.placeless import (
-    LOCAL_FRAME,
-    LOCAL_FRAME_HINT,
-    elsewhere_by,
-    is_local_frame,
-)
+from mapfilter.tracks.checks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT
 from mapfilter.tracks.checks.range_units import range_notes
 from mapfilter.tracks.checks.refused_motion import mirrored_notes, refused_faults
 from mapfilter.tracks.checks.rounded_degrees import rounded_notes
@@ -96,10 +91,7 @@ def _check_recordings(opened: OpenedLog, findings: Findings) -> None:
 
 def _is_near(path: Path, log: TrackLog, lattice: Lattice, findings: Findings) -> bool:
     if not same_crs(log.crs, lattice.crs):
-        evidence = f"The log is in {short_crs(log.crs)}, the area in {short_crs(lattice.crs)}: "
-        evidence += f"{elsewhere_by(log, lattice)}."
-        if is_local_frame(log.crs):
-            evidence = f"The log is in {LOCAL_FRAME}: {LOCAL_FRAME_HINT}."
+        evidence = f"The log is in {LOCAL_FRAME}: {LOCAL_FRAME_HINT}."
         findings.add("crs-mixed", str(path), evidence)
         return False
     for table in ("truth", "gnss"):

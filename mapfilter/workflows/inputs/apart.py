@@ -8,7 +8,7 @@ from pathlib import Path
 from mapfilter.config.fields import Section
 from mapfilter.config.sections import Config
 from mapfilter.database.checked import MANIFEST
-from mapfilter.errors import ConfigError, Faults, OutputError
+from mapfilter.errors import ConfigError, Faults, OutputError, fail
 from mapfilter.tracks.store import is_log
 
 _ALSO_WRITTEN = (
@@ -66,6 +66,19 @@ def check_out_apart(out: Path, inputs: Sequence[Path], option: str = "--out") ->
             hint = "results need a folder of their own"
             faults.add(option, f"a folder outside {path}, which is an input", str(out), hint)
     faults.raise_if_any(ConfigError)
+
+
+def check_in_no_store(out: Path, option: str = "--out") -> None:
+    """Raise ConfigError where a result would lie in a database or a log, whoever reads it.
+
+    A database holds the files that it lists alone, and all of a log's folder is read.
+    """
+    place = out.resolve()
+    for folder in (place, *place.parents):
+        what = "a database" if (folder / MANIFEST).is_file() else "a log" if is_log(folder) else ""
+        if what:
+            hint = "results need a folder of their own"
+            raise fail(ConfigError, option, f"a place outside {folder}, {what}", str(out), hint)
 
 
 def check_inputs_kept(inputs: Iterable[Path], replaced: Iterable[Path]) -> None:

@@ -21,18 +21,15 @@ from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.log_lacks import (
     NO_MOTION,
     POSITIONS_ALONE,
+    REPORTS_ALONE,
     check_places,
     coarse_pixels_note,
     follows_positions,
+    is_of_reports_alone,
     lack_of_log,
 )
 from mapfilter.tracks.checks.log_checks import ends_early
-from mapfilter.tracks.checks.placeless import (
-    LOCAL_FRAME,
-    LOCAL_FRAME_HINT,
-    elsewhere_by,
-    is_local_frame,
-)
+from mapfilter.tracks.checks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT
 from mapfilter.tracks.checks.rounded_degrees import rounded_notes
 from mapfilter.tracks.checks.turn_drift import turn_drift_radps
 from mapfilter.tracks.log import TrackLog
@@ -58,17 +55,13 @@ _DIFFERENCES_AT_FAULT = "time differences of a site whose clock is off, or witho
 
 
 def check_log(path: Path, log: TrackLog, lattice: Lattice, faults: Faults) -> None:
-    """Note a log in another CRS than the database, or far outside its lattice.
+    """Note a log in a local frame, unlike the database, or far outside its lattice.
 
     Its truth, or its GNSS fixes, may not all lie more than 5 km outside.
     """
     if not same_crs(log.crs, lattice.crs):
         expected = f"{short_crs(lattice.crs)}, the database's"
-        local = is_local_frame(log.crs)
-        hint = LOCAL_FRAME_HINT if local else elsewhere_by(log, lattice)
-        if not local and short_crs(log.crs) == "unknown":
-            hint = f"convert it with --crs {short_crs(lattice.crs)}"
-        faults.add(f"{path}, crs", expected, LOCAL_FRAME if local else log.crs, hint)
+        faults.add(f"{path}, crs", expected, LOCAL_FRAME, LOCAL_FRAME_HINT)
         return
     check_places(str(path), log, lattice, faults)
 
@@ -110,7 +103,10 @@ def lack_of(
 def _motion_note(
     opened: OpenedLog, log: TrackLog, options: Any, estimate: TrackEstimate
 ) -> tuple[str, ...]:
-    """Return a note on a log without motion that was located by its positions."""
+    """Return a note on a log without motion: what it was located by, and what locates it better."""
+    if is_of_reports_alone(log, options, estimate):
+        remedy = "mapfilter locate locates each report by itself"
+        return (f"{REPORTS_ALONE} ({remedy}){columns_of_motion(opened)}",)
     if not follows_positions(log, options, estimate):
         return ()
     made = _made_of_course(opened)
