@@ -17,7 +17,7 @@ from mapfilter._words import number_of
 from mapfilter.api.given import log_argument, opened, optional_database
 from mapfilter.api.mapless import over_sites, own_sites, without_sites
 from mapfilter.api.motion import with_right_motion
-from mapfilter.api.python_words import python_words
+from mapfilter.api.python_words import in_python, python_words
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, InputError
 from mapfilter.evaluation.truth import Truth
@@ -258,7 +258,8 @@ def locate(
     if database is not None and (alone or not database.cell_ids):
         notes += advice_of(log, options, found.estimate)
     notes += coarse_pixels_note(options, found.estimate, database)
-    log = replace(log, notes=(*log.notes, *notes)) if notes else log
+    told = tuple(map(in_python, (*log.notes, *notes)))
+    log = log if told == log.notes else replace(log, notes=told)
     return Track(found, log, database, trace)
 
 
