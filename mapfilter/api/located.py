@@ -17,7 +17,7 @@ from mapfilter._words import number_of
 from mapfilter.api.given import log_argument, opened, optional_database
 from mapfilter.api.mapless import over_sites, own_sites, without_sites
 from mapfilter.api.motion import with_right_motion
-from mapfilter.api.python_words import python_words
+from mapfilter.api.python_words import in_python, python_words
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Faults, InputError
 from mapfilter.evaluation.truth import Truth
@@ -27,7 +27,7 @@ from mapfilter.positioning.assumed_errors import assumed_note, undirected_notes
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.filter import Filter
 from mapfilter.positioning.integrity import DEFAULT_RISK
-from mapfilter.positioning.locators import DEFAULT, as_filter, filter_options
+from mapfilter.positioning.locators import DEFAULT, as_filter, given_options
 from mapfilter.positioning.log_lacks import (
     NO_MOTION,
     POSITIONS_ALONE,
@@ -174,8 +174,8 @@ def locate(
         A path is opened by each call; open it once for many logs. Kalman-type filters need none:
         ``locate(log, filter="ekf")`` is by GNSS fixes and dead reckoning. For levels and timing
         advances they need sites: ``KalmanFilter().over_sites(plan)``; else these are left out, with
-        a note. Without a database a path is read in the UTM zone of its positions, or the CRS of
-        its sites.
+        a note. Nor does a :class:`mapfilter.Filter` of yours that is over no database. Without one
+        a path is read in the UTM zone of its positions, or the CRS of the sites or the filter.
     filter : options, str, Filter or class
         Options such as ``BayesFilter(level_error_db=8.0)``, the name of a filter, or a custom
         filter (see the page "Extending"). The Bayes map filter when left out. What the log states
@@ -225,7 +225,7 @@ def locate(
         ],
     )
     rng = generator("locate", seed)
-    given_filter = filter_options(filter) if isinstance(filter, str) else filter
+    given_filter = given_options(filter)
     database = None if database is None else opened(database)
     plan = own_sites(given_filter) if database is None else database.plan
     about_deg = None if plan is None else plan.middle_deg
@@ -261,7 +261,8 @@ def locate(
     if database is not None and (alone or not database.cell_ids):
         notes += advice_of(log, options, found.estimate)
     notes += coarse_pixels_note(options, found.estimate, database)
-    log = replace(log, notes=(*log.notes, *notes)) if notes else log
+    told = tuple(map(in_python, (*log.notes, *notes)))
+    log = log if told == log.notes else replace(log, notes=told)
     return Track(found, log, database, trace)
 
 

@@ -6,6 +6,9 @@ from typing import Any
 
 from mapfilter.errors import ConfigError, fail
 from mapfilter.positioning import BUILT_IN
+from mapfilter.positioning.belief_tracker import BeliefTracker
+from mapfilter.positioning.custom_filter import own_name
+from mapfilter.positioning.filter import Filter
 from mapfilter.positioning.kalman.filter import KalmanFilter, KalmanTracker
 from mapfilter.positioning.kalman.siteless import needs_sites, without_cells
 from mapfilter.positioning.locators import filter_options
@@ -18,9 +21,11 @@ _OVER_SITES = "KalmanFilter().over_sites(plan)"
 def own_sites(given: Any) -> CellPlan | None:
     """Return the sites that a filter without a map has of its own, None where it has none.
 
+    Of a :class:`mapfilter.Filter` that a user made it is a plan without any, in the filter's CRS.
+
     Parameters
     ----------
-    given : KalmanFilter, its class, or what its ``over_sites`` returned
+    given : KalmanFilter, what its ``over_sites`` returned, or a Filter of the user
 
     Raises
     ------
@@ -29,10 +34,13 @@ def own_sites(given: Any) -> CellPlan | None:
     """
     if isinstance(given, KalmanTracker):
         return given.sites.plan
-    if isinstance(given, KalmanFilter) or given is KalmanFilter:
+    if isinstance(given, KalmanFilter):
         return None
-    own = getattr(given, "name", None)
-    name = own if isinstance(own, str) else getattr(given, "__name__", type(given).__name__)
+    # Filters of beliefs, as the candidate filter, are over a database, whose plan names cells.
+    own = isinstance(given, Filter) and not isinstance(given, BeliefTracker)
+    if own and given.made_of is None:
+        return CellPlan(given.crs, ())
+    name = own_name(given, getattr(given, "__name__", type(given).__name__))
     able = ", ".join(one for one in BUILT_IN if isinstance(filter_options(one), KalmanFilter))
     expected = f"a database of open_database or build, or its path, for the filter {name}"
     hint = f'left out; {able} need none, as in locate(log, filter="ekf")'
@@ -59,7 +67,7 @@ def over_sites(given: Any, plan: CellPlan) -> KalmanTracker:
 
     Parameters
     ----------
-    given : KalmanFilter or its class
+    given : KalmanFilter
     """
-    options: KalmanFilter = given() if isinstance(given, type) else given
-    return options.over_sites(plan)
+    tracker: KalmanTracker = given.over_sites(plan)
+    return tracker

@@ -37,10 +37,14 @@ _WITH_VALUE = re.compile(
     r"(?<![\w-])--(crs|filter|truth|format) (EPSG:\w+|ekf|\S+\.\w+|[a-z]+(?=, or none))"
 )
 _PLACE = re.compile(r"(?<![\w-])--origin LAT,LON")
+_SETTING = re.compile(r"\bfilter\.(?P<of>bayes|grid|kalman)\.(?P<name>\w+)(?: = (?P<value>\w+))?")
+_OPTIONS = {"bayes": "BayesFilter", "grid": "GridFilter", "kalman": "KalmanFilter"}
+_RASTERS = 'rasters.resolution_m and rasters.resampling = "bilinear"'
+_OPENED = 'mf.open_rasters(…, resolution_m=…, resampling="bilinear")'
 
 
 def in_python(text: str) -> str:
-    """Return a message with the arguments of Python in place of options of commands.
+    """Return a message with arguments of Python in place of options of commands and of settings.
 
     Examples
     --------
@@ -50,7 +54,10 @@ def in_python(text: str) -> str:
     'give zone or offsets_s; columns={"speed_mps": "v [m/s]"}'
     >>> in_python("mapfilter convert --crs EPSG:CODE; --crs EPSG:CODE")
     'mapfilter convert --crs EPSG:CODE; crs="EPSG:CODE"'
+    >>> in_python("if a vehicle moved, set filter.bayes.vehicle = true")
+    'if a vehicle moved, set BayesFilter(vehicle=True)'
     """
+    text = _SETTING.sub(_option, text).replace(_RASTERS, _OPENED)
     text = text.replace("--zone of convert and replay", "zone of mf.read_log")
     parts = _COMMAND.split(text)
     return "".join(part if n % 2 else _without_options(part) for n, part in enumerate(parts))
@@ -94,6 +101,14 @@ def _without_options(text: str) -> str:
     text = _PLACE.sub("origin_deg=(LAT, LON)", text)
     text = _WITH_VALUE.sub(lambda found: f'{_ARGUMENTS[found[1]]}="{found[2]}"', text)
     return _OPTION.sub(_argument, text)
+
+
+def _option(found: re.Match[str]) -> str:
+    of, value = _OPTIONS[found["of"]], found["value"]
+    if value is None:
+        return f"{found['name']} of {of}"
+    shown = value.capitalize() if value in ("true", "false") else value
+    return f"{of}({found['name']}={shown})"
 
 
 def _argument(found: re.Match[str]) -> str:

@@ -46,10 +46,10 @@ from mapfilter.experiments.sweep.plan import (
 )
 from mapfilter.experiments.sweep.run import sweep_runs
 from mapfilter.experiments.sweep.world import SweepWorld
-from mapfilter.options import Options, Positive
+from mapfilter.options import Positive
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.custom_filter import GivenFilter
-from mapfilter.positioning.locators import filter_options
+from mapfilter.positioning.locators import given_options
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.osm import Profile
@@ -187,9 +187,7 @@ def _readings(filters: Mapping[str, Any], *, here: bool) -> tuple[Reading, ...]:
     if not filters:
         faults.add("sweep, filters", f"at least one, {_FILTERS}", "none")
     for name, given in filters.items():
-        options: Any = filter_options(given) if isinstance(given, str) else given
-        if isinstance(given, type) and issubclass(given, Options):
-            options = given()
+        options = given_options(given)
         if isinstance(options, type) or not hasattr(options, "over"):
             wrong = _not_a_filter(options, here=here)
             if wrong is not None:

@@ -6,6 +6,7 @@ inertial data, radio reports and GNSS fixes tick at different rates.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite
@@ -180,6 +181,10 @@ class BeliefFilter(Protocol[PriorT, BeliefT, ReadingT]):
         """Return the position of the belief."""
 
 
+PLACE_SHAPES = {"east_m": (), "north_m": (), "covariance_m2": (2, 2), "radii_m": (3,)}
+"""Shapes of the fields that hold a position."""
+
+
 class ReturnTypeError(TypeError):
     """A function of a filter returned something else than its contract says.
 
@@ -236,6 +241,32 @@ def checked_estimate(returned: Any) -> Estimate:
     if isinstance(returned, Estimate):
         return returned
     raise ReturnTypeError("locate", "Estimate", _type_name(returned))
+
+
+def check_shapes(function: str, returned: Any, shapes: Mapping[str, tuple[int, ...]]) -> None:
+    """Check that what a function of a filter returned holds numbers, in arrays of some shapes.
+
+    Parameters
+    ----------
+    shapes : mapping of str to tuple of int
+        By field; () for a single number.
+
+    Raises
+    ------
+    ReturnTypeError
+        A field holds something else.
+    """
+    for name, shape in shapes.items():
+        value = getattr(returned, name)
+        try:
+            found = None if value is None else np.asarray(value, dtype=np.float64).shape
+        except (TypeError, ValueError):
+            found = None
+        if found != shape:
+            expected = f"{name} of shape {shape}" if shape else f"{name} as a number"
+            raise ReturnTypeError(
+                function, expected, _type_name(value) if found is None else f"shape {found}"
+            )
 
 
 def _type_name(value: object) -> str:

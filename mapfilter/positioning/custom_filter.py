@@ -13,9 +13,10 @@ import hashlib
 import inspect
 import sys
 import traceback
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -25,18 +26,35 @@ import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, MapfilterError, fail
-from mapfilter.filters.contract import ReturnTypeError, check_kinds, checked_pair
+from mapfilter.filters.contract import (
+    PLACE_SHAPES,
+    Estimate,
+    Reason,
+    ReturnTypeError,
+    Status,
+    check_kinds,
+    check_shapes,
+    checked_pair,
+)
 from mapfilter.positioning.belief_tracker import BeliefTracker, TrackState
 from mapfilter.positioning.candidate import cell_points, startable
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind, Smoother
-from mapfilter.positioning.step_output import StepOutput
+from mapfilter.positioning.step_output import Fix, StepOutput
 
 ADVICE = "mapfilter.testing.check_filter names the clause of the contract that it breaks"
 """Hint of errors in the code of a custom filter."""
 
+_ALONE = ("time_s", "mass_50m", "way_probability", "radius_99_m", "protection_m")
+_FIX_SHAPES: Mapping[str, tuple[int, ...]] = PLACE_SHAPES | dict.fromkeys(_ALONE, ())
 _BELIEF_FUNCTIONS = ("init", "predict", "update", "locate")
 _EPOCH_FUNCTIONS = ("begin", "step")
+
+
+def own_name(made: object, otherwise: str) -> str:
+    """Return the name that a filter gives itself by a text ``name``, or another one without it."""
+    name = getattr(made, "name", None)
+    return name if isinstance(name, str) and name else otherwise
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,14 +97,18 @@ class GivenFilter:
 
     @property
     def name(self) -> str:
-        """Name of the class or function."""
-        return str(getattr(self.make, "__name__", type(self.make).__name__))
+        """The name that the class gives itself, else that of the class or function."""
+        make = self.make
+        while isinstance(make, partial):
+            make = make.func
+        return own_name(make, str(getattr(make, "__name__", type(make).__name__)))
 
     def over(self, database: RadioRouteDatabase, *, ways: bool = True) -> Filter[Any]:
         """Make the filter over a database; ConfigError where it lacks a function."""
         with wrap_user_errors(self.name, self.make):
             made = self.make(database)
-        return adapted(made, database, self.name, ways=ways)
+            name = own_name(made, self.name)
+        return adapted(made, database, name, ways=ways)
 
 
 def custom_filter(name: str) -> CustomFilter:
@@ -240,6 +262,12 @@ class CustomTracker(BeliefTracker):
         with wrap_user_errors(self.name, self.filter):
             return super().step(state, epoch, rng)
 
+    def _fix(
+        self, epoch: Epoch, located: Estimate, status: Status, count: int, reason: Reason
+    ) -> Fix:
+        check_shapes("locate", located, PLACE_SHAPES)
+        return super()._fix(epoch, located, status, count, reason)
+
 
 @dataclass(frozen=True, eq=False)
 class CustomEpochFilter(Filter[Any]):
@@ -299,4 +327,9 @@ class CustomEpochFilter(Filter[Any]):
             returned = self.filter.step(state, epoch, rng)
             after, output = checked_pair(returned, "step", "state", StepOutput)
             check_kinds("step", output.fix.status, output.fix.reason)
+            check_shapes("step", output.fix, _FIX_SHAPES)
+            for name in ("hypotheses", "way_id"):
+                if not hasattr(getattr(output.fix, name), "__index__"):
+                    found = type(getattr(output.fix, name)).__name__
+                    raise ReturnTypeError("step", f"{name} as a whole number", found)
             return after, output

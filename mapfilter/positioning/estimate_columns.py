@@ -7,6 +7,7 @@ from array import array
 import numpy as np
 
 from mapfilter._types import Floats
+from mapfilter.errors import InputError, fail
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import TrackEstimate, TrackEvidence
 from mapfilter.positioning.step_output import StepOutput, UnusedReading
@@ -28,8 +29,20 @@ class EstimateColumns:
         self._unused: list[UnusedReading] = []
 
     def add(self, output: StepOutput) -> None:
-        """Add the output of one epoch; tails are not kept."""
+        """Add the output of one epoch; tails are not kept.
+
+        Raises
+        ------
+        InputError
+            Covariance or radii have another shape.
+        """
         fix = output.fix
+        covariance_m2 = np.asarray(fix.covariance_m2, dtype=np.float64)
+        radii_m = np.asarray(fix.radii_m, dtype=np.float64)
+        if covariance_m2.shape != (2, 2) or radii_m.shape != (3,):
+            expected = "covariance_m2 of shape (2, 2) and radii_m of shape (3,)"
+            found = f"{covariance_m2.shape} and {radii_m.shape}"
+            raise fail(InputError, "step, fix", expected, found)
         self._numbers.extend(
             (
                 fix.time_s,
@@ -41,8 +54,8 @@ class EstimateColumns:
                 fix.protection_m,
             )
         )
-        self._numbers.extend(np.asarray(fix.covariance_m2, dtype=np.float64).ravel().tolist())
-        self._numbers.extend(np.asarray(fix.radii_m, dtype=np.float64).tolist())
+        self._numbers.extend(covariance_m2.ravel().tolist())
+        self._numbers.extend(radii_m.tolist())
         self._whole.extend((fix.hypotheses, fix.way_id))
         self._status.append(fix.status)
         self._reason.append(fix.reason)

@@ -7,12 +7,13 @@ from difflib import get_close_matches
 from importlib import import_module
 from typing import Any
 
+from mapfilter._arguments import shown
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, fail
 from mapfilter.options import Options
 from mapfilter.positioning import BUILT_IN as BUILT_IN
 from mapfilter.positioning import DEFAULT as DEFAULT
-from mapfilter.positioning.custom_filter import GivenFilter, adapted, custom_filter
+from mapfilter.positioning.custom_filter import GivenFilter, adapted, custom_filter, own_name
 from mapfilter.positioning.filter import Filter, FilterOptions
 
 
@@ -54,6 +55,13 @@ def _likely(name: str) -> str:
     return next(iter(get_close_matches(name.lower(), BUILT_IN, n=1)), "")
 
 
+def given_options(given: Any) -> Any:
+    """Return options for their name or class, with their defaults; all else as it is."""
+    if isinstance(given, str):
+        return filter_options(given)
+    return given() if isinstance(given, type) and issubclass(given, Options) else given
+
+
 def as_filter(given: Any, database: RadioRouteDatabase, *, ways: bool = True) -> Filter[Any]:
     """Return a filter over the area of a database.
 
@@ -71,15 +79,15 @@ def as_filter(given: Any, database: RadioRouteDatabase, *, ways: bool = True) ->
     ConfigError
         It is none of these.
     """
-    if isinstance(given, str):
-        given = filter_options(given)
+    given = given_options(given)
     if isinstance(given, Filter):
         return given
     if hasattr(given, "over") and not isinstance(given, type):
         found: Filter[Any] = given.over(database, ways=ways)
         return found
     if callable(given):
-        if isinstance(given, type) and issubclass(given, Options):
-            return as_filter(given(), database, ways=ways)
         return GivenFilter(given).over(database, ways=ways)
-    return adapted(given, database, type(given).__name__, ways=ways)
+    if not any(callable(getattr(given, one, None)) for one in ("begin", "step", "init", "locate")):
+        expected = "the name of a filter, options such as BayesFilter(), or a class"
+        raise fail(ConfigError, "filter", expected, shown(given))
+    return adapted(given, database, own_name(given, type(given).__name__), ways=ways)

@@ -33,7 +33,7 @@ def said(log, filter_):
 def test_fixes_without_an_error_are_noted_with_what_is_assumed(variance_m2, count):
     (note,) = said(log_with(variance_m2), mf.KalmanFilter(fix_sd_m=7.0))
     assert note.startswith(f"gnss: {count} without an error: a standard deviation of 7 m east and")
-    assert "(filter.kalman.fix_sd_m;" in note
+    assert "(fix_sd_m of KalmanFilter;" in note
 
 
 def test_what_is_assumed_is_what_the_filter_takes():

@@ -47,6 +47,14 @@ def test_a_bound_filter_is_fitted_as_its_options_are(options, database, lte):
     assert not in_steps_of_gsm.to_dataframe().equals(found.to_dataframe())
 
 
+@pytest.mark.parametrize("options", [mf.KalmanFilter, mf.BayesFilter])
+def test_the_class_of_options_is_fitted_as_its_defaults_are(options, database, lte):
+    found, by_defaults = mf.locate(lte, database, options), mf.locate(lte, database, options())
+    pd.testing.assert_frame_equal(found.to_dataframe(), by_defaults.to_dataframe())
+    assert found.log.notes == by_defaults.log.notes
+    assert "timing advance: steps of 78.07 m, by technology" in found.log.notes
+
+
 def test_sites_of_its_own_read_timing_advances_as_the_log_states(database, lte):
     found = mf.locate(lte, filter=mf.KalmanFilter().over_sites(database.plan))
     by_database = mf.locate(lte, database, "ekf")

@@ -68,5 +68,5 @@ def test_an_unknown_name_is_refused_with_those_that_there_are(name):
 
 
 def test_what_is_no_filter_is_refused(tmp_path):
-    with pytest.raises(ConfigError, match="expected the functions init, predict, update, locate"):
+    with pytest.raises(ConfigError, match=r"filter: expected the name of a filter, .*found 3\.0"):
         as_filter(3.0, make_database(tmp_path))

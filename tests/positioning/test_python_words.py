@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from cross_world import walk_log
 
 import mapfilter as mf
 from mapfilter.api.python_words import in_python, python_words
@@ -59,6 +60,12 @@ def test_every_option_that_these_rooms_name_has_words_of_python():
         ("see --origin and --crs", "see origin_deg and crs"),
         ("step_m = 0.8 (--step-length) has", "step_m = 0.8 (walk=WalkOptions(step_m=…)) has"),
         ("leave out --course-motion", "leave out course_motion"),
+        ("moved, set filter.bayes.vehicle = true", "moved, set BayesFilter(vehicle=True)"),
+        ("assumed (filter.kalman.fix_sd_m; in", "assumed (fix_sd_m of KalmanFilter; in"),
+        (
+            'with rasters.resolution_m and rasters.resampling = "bilinear", or',
+            'with mf.open_rasters(…, resolution_m=…, resampling="bilinear"), or',
+        ),
         ("/data/my--zone/a.csv", "/data/my--zone/a.csv"),
     ],
 )
@@ -74,6 +81,17 @@ def test_faults_and_notes_of_an_error_are_put_in_these_words():
     assert str(refused.value) == fault
     assert refused.value.args == (refused.value.faults,)
     assert notes_of(refused.value) == ["see zone"]
+
+
+def test_notes_of_a_located_log_name_options_of_python(database):
+    walk = walk_log()
+    motion = walk.motion.assign(heading_rad=np.nan, turn_rad=0.0)
+    fixes = walk.truth[["time_s", "east_m", "north_m"]].iloc[::10]
+    alone = mf.locate(mf.make_log(walk.crs, motion=motion), database).log.notes
+    assert any("set BayesFilter(vehicle=True)" in note for note in alone), alone
+    placed = mf.locate(mf.make_log(walk.crs, gnss=fixes), filter="ekf").log.notes
+    assert any("fix_sd_m of KalmanFilter" in note for note in placed), placed
+    assert not any("filter." in note for note in (*alone, *placed))
 
 
 def test_errors_and_notes_of_read_log(tmp_path):
