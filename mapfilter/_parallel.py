@@ -63,8 +63,7 @@ def worker_processes(count: int) -> Iterator[Executor]:
             yield pool
         except BaseException:
             # Nobody waits for tasks in the midst of which this one is left.
-            pool.end_workers()
-            pool.shutdown(wait=False, cancel_futures=True)
+            pool.abandon()
             raise
 
 

@@ -100,6 +100,15 @@ class LocalWorkers(ProcessPoolExecutor):
             self._held.close()
             self._watched.close()
 
+    def abandon(self) -> None:
+        """End all workers now, and cancel what they have not begun."""
+        overseer = self._executor_manager_thread
+        self.end_workers()
+        self.shutdown(wait=False, cancel_futures=True)
+        if overseer is not None:
+            # An interpreter that ends while this thread closes its pipe prints a traceback.
+            overseer.join(_LATEST_S)
+
     def _close_results(self) -> None:
         with self._ending:
             self._results._reader.close()

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -90,6 +91,18 @@ def test_a_block_that_is_left_waits_for_no_task():
     with pytest.raises(ZeroDivisionError), local_executor(2) as executor:
         leave(executor)
     assert time.monotonic() - began_s < LONG_S / 2
+
+
+def test_a_block_that_is_left_leaves_no_thread_of_its_pool():
+    # An interpreter that ends while the thread closes its pipe prints a traceback.
+    def leave(executor):
+        executor.submit(os.getpid).result()
+        raise ZeroDivisionError
+
+    before = set(threading.enumerate())
+    with pytest.raises(ZeroDivisionError), local_executor(2) as executor:
+        leave(executor)
+    assert [one for one in threading.enumerate() if not one.daemon and one not in before] == []
 
 
 def killed(number):

@@ -264,3 +264,25 @@ def test_a_whole_identity_beside_a_cell_of_its_node(read, name):
     whole = 256 * (4571 + np.arange(COUNT) // 20) + 1
     radio, _ = read(mcc=244, mnc=91, tac=7, cid=1, **{name: whole})
     assert radio["cell"].tolist() == [f"244-91-7-{one}" for one in whole]
+
+
+def test_numbers_that_are_all_zero_are_no_identity(read):
+    """As of neighbours in rows of Network Survey: they were one cell 0-0-0-0, without a carrier."""
+    serves = np.arange(COUNT) % 2 == 0
+    columns = {
+        name: np.where(serves, number, 0)
+        for name, number in {"mcc": 244, "mnc": 91, "tac": 3021, "eci": 300802}.items()
+    }
+    radio, _ = read(**columns, earfcn=1300, pci=7 + np.arange(COUNT))
+    neighbour = radio["role"] == "neighbour"
+    assert neighbour.tolist() == (~serves).tolist()
+    assert set(radio.loc[~neighbour, "cell"]) == {"244-91-3021-300802"}
+    assert radio.loc[neighbour, "cell"].isna().all()
+    assert radio.loc[neighbour, ["mcc", "mnc", "lac", "ci"]].isna().all(axis=None)
+    assert (radio["bsic"] == 7 + np.arange(COUNT)).all()
+
+
+def test_a_cell_of_number_zero_in_a_network_is_one(read):
+    radio, _ = read(mcc=244, mnc=91, lac=171, ci=0)
+    assert set(radio["cell"]) == {"244-91-171-0"}
+    assert set(radio["role"]) == {"serving"}

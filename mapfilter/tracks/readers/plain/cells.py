@@ -10,7 +10,7 @@ from mapfilter.radio.identities import BARS_DBM, levels_of_bars, technology
 from mapfilter.tracks.readers.plain.fields import FIELDS
 from mapfilter.tracks.readers.plain.identities import cell_identities, roles
 from mapfilter.tracks.readers.plain.mapped import Mapped
-from mapfilter.tracks.readers.recorded.identities import add_radio
+from mapfilter.tracks.readers.recorded.identities import add_radio, without_zeros
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.texts.columns import MISSING, only
 
@@ -24,7 +24,7 @@ def add_cells(mapped: Mapped, reading: Reading, time_s: Floats) -> None:
     """Add the rows that hold a cell or a level."""
     if not any(map(mapped.has, ("level_dbm", "bars", "ci", "cell", "cgi", "enodeb"))):
         return
-    identity = cell_identities(mapped)
+    identity = without_zeros(cell_identities(mapped))
     columns = {
         **identity,
         "time_s": time_s,

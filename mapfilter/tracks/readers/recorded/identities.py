@@ -71,6 +71,21 @@ def cell_names(mcc: Floats, mnc: Floats, lac: Floats, ci: Floats) -> np.ndarray:
     return names[codes]
 
 
+def without_zeros(identity: Mapping[str, Floats]) -> dict[str, Floats]:
+    """Return mcc, mnc, lac and ci with NaN where a program writes 0 for all that it does not know.
+
+    No country has the code 0.
+
+    Examples
+    --------
+    >>> zero, known = np.zeros(2), np.array([0.0, 244.0])
+    >>> without_zeros({"mcc": known, "mnc": zero, "lac": zero, "ci": zero})["ci"].tolist()
+    [nan, 0.0]
+    """
+    none = (identity["mcc"] == 0) & (identity["ci"] == 0)
+    return {name: np.where(none, np.nan, identity[name]) for name in ("mcc", "mnc", "lac", "ci")}
+
+
 def _beyond(label: str, limit: str, line: int, count: int) -> str:
     some = number_of(count, "value is", "values are")
     return f"{label}: {some} not {limit}, ignored (first in line {line})"
@@ -87,6 +102,7 @@ def add_radio(reading: Reading, columns: Mapping[str, Any], lines: ArrayLike) ->
     for name in ("mcc", "mnc", "lac", "ci", "arfcn", "bsic", "timing_advance", "level_dbm"):
         given[name] = np.broadcast_to(np.asarray(given.get(name, np.nan), dtype=np.float64), count)
     given["ci"] = np.where(np.isin(given["ci"], _NO_CELL), np.nan, given["ci"])
+    given |= without_zeros(given)
     families = given.get("technology")
     if families is None:
         families = np.full(count, None, dtype=object)
