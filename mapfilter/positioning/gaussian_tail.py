@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import cos, erfc, exp, inf, isfinite, log, nan, pi, sin, sqrt
+from math import inf, isfinite, log, nan, pi, sqrt
 
 import numpy as np
 from numba import njit
 
 from mapfilter._types import Floats
 from mapfilter.positioning.integrity import usable_risk
+from mapfilter.positioning.normal_kernels import exp64, sin_cos64, tail64
 
 _STEPS = 36
 _FAR = 9.0
@@ -75,23 +76,7 @@ class GaussianTail:
         return self.weights, np.abs(turned), np.stack([long_m, short_m], axis=1)
 
 
-@njit(error_model="numpy", cache=True)
-def _upper(z: float) -> float:
-    """Return the share of a standard normal above z."""
-    return 0.5 * erfc(z / sqrt(2.0))
-
-
-@njit(error_model="numpy", cache=True)
-def _both_sides(up: float, across: float, short: float) -> float:
-    """Return the share of a normal above ``up`` and below ``-up``, of a mean that is above 0."""
-    near, far = (up - across) / short, (up + across) / short
-    if far > 10.0 and far * far - max(near, 0.0) ** 2 > 90.0:
-        # What lies beyond the far side does not change the sum's last bit.
-        return _upper(near) if near > -10.0 else 1.0
-    return _upper(near) + _upper(far)
-
-
-@njit(error_model="numpy", cache=True)
+@njit(error_model="numpy", fastmath={"contract", "reassoc"}, cache=True)
 def _outside(
     radius: float, along: float, across: float, long: float, short: float, rule: Floats
 ) -> float:
@@ -104,7 +89,7 @@ def _outside(
         return 0.0
     if away - _FAR * long >= radius:
         return 1.0
-    beyond: float = _upper((radius - along) / long) + _upper((radius + along) / long)
+    beyond: float = tail64((radius - along) / long) + tail64((radius + along) / long)
     # Where the circle is as far from the axis as the mean, the inner integral is a step.
     step = sqrt(max(radius * radius - across * across, 0.0))
     edges = (-radius, -step, step, radius)
@@ -115,12 +100,13 @@ def _outside(
             continue
         from_, to = np.arcsin(low / radius), np.arcsin(high / radius)
         half, middle = 0.5 * (to - from_), 0.5 * (to + from_)
+        integral = 0.0
         for k in range(rule.shape[1]):
-            angle = middle + half * rule[0, k]
-            away, up = radius * sin(angle), radius * cos(angle)
-            z = (away - along) / long
-            density = exp(-0.5 * z * z) / (long * sqrt(2.0 * pi)) * up
-            beyond += half * rule[1, k] * density * _both_sides(up, across, short)
+            sine, cosine = sin_cos64(middle + half * rule[0, k])
+            z, up = (radius * sine - along) / long, radius * cosine
+            sides = tail64((up - across) / short) + tail64((up + across) / short)
+            integral += rule[1, k] * exp64(-0.5 * z * z) * up * sides
+        beyond += half / (long * sqrt(2.0 * pi)) * integral
     return beyond
 
 

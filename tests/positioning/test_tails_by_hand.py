@@ -1,13 +1,13 @@
 """Tails of samples and of Gaussians by hand: rings, kernels, and levels in closed form."""
 
 from dataclasses import replace
-from math import erfc, exp, inf, isnan, log, nan, pi, sqrt
+from math import exp, inf, isnan, log, nan, pi, sqrt
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from mapfilter.positioning.gaussian_tail import GaussianTail, _both_sides
+from mapfilter.positioning.gaussian_tail import GaussianTail
 from mapfilter.positioning.integrity import (
     DEFAULT_RISK,
     SampleTail,
@@ -257,19 +257,3 @@ def test_radius_of_a_mixture_is_where_its_share_lies_beyond(weights, thin, share
         low_m, high_m = (low_m, middle_m) if is_within else (middle_m, high_m)
     # The radius is taken too large by 1e-5 of it at most.
     assert high_m * (1 - 1e-6) <= tail.radius_m(1 - share) <= high_m * (1 + 1.2e-5)
-
-
-@pytest.mark.parametrize(
-    ("up", "across", "short", "near", "far"),
-    [
-        (11.0, 0.0, 1.0, 11.0, 11.0),
-        (23.0, 0.2, 2.0, 11.4, 11.6),
-        (5.0, 9.0, 1.0, -4.0, 14.0),
-        (5.0, 19.0, 1.0, -14.0, 24.0),
-        (1.0, 0.5, 0.5, 1.0, 3.0),
-    ],
-)
-def test_both_sides_of_a_normal_count_to_the_last_digit(up, across, short, near, far):
-    """Where neither side is more than the other by far, too, be it ever so thin."""
-    expected = (erfc(near / sqrt(2)) + erfc(far / sqrt(2))) / 2
-    assert _both_sides(up, across, short) == pytest.approx(expected, rel=1e-12, abs=0.0)
