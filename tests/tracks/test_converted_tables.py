@@ -155,3 +155,49 @@ def test_whole_numbers_without_a_unit_name_both_that_they_may_have(tmp_path):
     table = {"time": TIME_S, "lat": WATCH["record.position_lat[semicircles]"], "lon": 1e7 * LON}
     with pytest.raises(InputError, match=r"name the column lat \[degE7\]; or semicircles of FIT"):
         read(tmp_path, table)
+
+
+JAMMED = np.arange(COUNT) >= COUNT // 2
+
+
+@pytest.mark.parametrize(
+    ("table", "column", "fix", "none"),
+    [
+        (PX4, "fix_type", 3, 0),
+        (PX4, "fix_type", 3, 1),
+        (ARDUPILOT, "Status", 4, 1),
+        (NAV_PVT, "fixType", 3, 1),
+        (NAV_PVT, "gnssFixOk", 1, 0),
+        (NAV_PVT, "gnssFixOk", True, False),
+        (BAG, "field.status.status", 0, -1),
+        ({"time": TIME_S, "latitude": LAT, "longitude": LON}, "fix_type", 1, 0),
+        ({"time": TIME_S, "latitude": LAT, "longitude": LON}, "fix", "3D", "NO_FIX"),
+        ({"time": TIME_S, "latitude": LAT, "longitude": LON}, "fix_quality", 1, 0),
+    ],
+)
+def test_positions_that_a_receiver_states_to_be_none_are_left_out(
+    tmp_path, table, column, fix, none
+):
+    """While it is jammed it repeats the last one, which was taken for measured."""
+    states = pd.Series([fix] * COUNT, dtype=object).where(~JAMMED, none)
+    found = read(tmp_path, {**table, column: states})
+    np.testing.assert_allclose(found.tables["positions"]["time_s"], TIME_S[~JAMMED], atol=1e-3)
+    assert [(one.count, one.reason) for one in found.unusable] == [
+        (JAMMED.sum(), f"no fix, by column {column.lower()}")
+    ]
+    assert not any(column.lower() in text for text in found.unread)
+
+
+@pytest.mark.parametrize("states", [0, 1, np.arange(COUNT) % 2, "gps"])
+def test_states_that_tell_nothing_of_a_fix_leave_all_positions(tmp_path, states):
+    """Of a column that is always 0 nothing is known; one in which 1 is the best is a flag."""
+    table = {"time": TIME_S, "latitude": LAT, "longitude": LON, "fix_type": states}
+    places = read(tmp_path, table).tables["positions"]
+    assert len(places) == (COUNT if np.ndim(states) == 0 else COUNT // 2)
+
+
+def test_motion_in_rows_without_a_fix_counts(tmp_path):
+    table = {"time": TIME_S, "lat": LAT, "lon": LON, "wheel_speed_mps": SPEED}
+    found = read(tmp_path, {**table, "fix_type": np.where(JAMMED, 0, 3)})
+    assert len(found.tables["odometry"]) == COUNT
+    assert len(found.tables["positions"]) == (~JAMMED).sum()
