@@ -67,4 +67,4 @@ def _whole(parts: Sequence[Floats], nano: Floats) -> np.ndarray:
     first = months.astype(np.int64).astype("datetime64[M]").astype("datetime64[us]")
     elapsed_us = (((np.maximum(day, 1) - 1) * 24 + hour) * 60 + minute) * 60e6 + second * 1e6
     whole = first + np.round(elapsed_us + nano / 1e3).astype(np.int64).astype("timedelta64[us]")
-    return np.datetime_as_string(whole, unit="us")
+    return np.asarray(np.datetime_as_string(whole, unit="us"))

@@ -30,9 +30,8 @@ def fix_column(rows: Columns, own: frozenset[str] = frozenset()) -> str:
     own : frozenset of str
         Columns of fields.
     """
-    names = (*_FLAGS, *_TYPES, *_QUALITIES, *_OF_BAGS)
-    if rows.has(*_ARDUPILOT):
-        names = ("status", *names)
+    first = ("status",) if rows.has(*_ARDUPILOT) else ()
+    names = (*first, *_FLAGS, *_TYPES, *_QUALITIES, *_OF_BAGS)
     found = (name for name in names if name in rows.names and name not in own)
     return next((name for name in found if rows.names.count(name) == 1), "")
 
