@@ -29,7 +29,14 @@ UNITS: Mapping[str, Mapping[str, float]] = {
         "deg/h": _DEGREE / 3600,
         "rpm": 2 * pi / 60,
     },
-    "angle": {"rad": 1.0, "deg": _DEGREE, "mrad": 0.001, "gon": pi / 200},
+    "angle": {
+        "rad": 1.0,
+        "deg": _DEGREE,
+        "mrad": 0.001,
+        "gon": pi / 200,
+        "dege7": 1e-7 * _DEGREE,
+        "semicircles": pi / 2**31,
+    },
     "length": {
         "m": 1.0,
         "km": 1000.0,
@@ -74,6 +81,8 @@ _OTHER_NAMES = {
     **dict.fromkeys(("rev/min", "1/min"), "rpm"),
     **dict.fromkeys(("m/s/s", "ms-2", "mps2"), "m/s2"),
     **dict.fromkeys(("microtesla",), "ut"),
+    **dict.fromkeys(("1e-7deg", "e7deg"), "dege7"),
+    **dict.fromkeys(("semicircle",), "semicircles"),
 }
 _WORDS = {
     **dict.fromkeys(("radian", "radians"), "rad"),

@@ -102,7 +102,7 @@ class LocalWorkers(ProcessPoolExecutor):
 
     def abandon(self) -> None:
         """End all workers now, and cancel what they have not begun."""
-        overseer = self._executor_manager_thread
+        overseer: Any = self._executor_manager_thread
         self.end_workers()
         self.shutdown(wait=False, cancel_futures=True)
         if overseer is not None:

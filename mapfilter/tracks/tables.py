@@ -33,6 +33,8 @@ from mapfilter.tracks.schema import (
 _SELDOM_S = 10.0
 _SOMEWHERE_M = 25.0
 _SLOW_MPS = 0.04
+_UNITS = ((1e8, "nanoseconds", "ns"), (1e5, "microseconds", "us"), (0.0, "milliseconds", "ms"))
+"""Units of times by the least number between rows a tenth of a second to minutes apart."""
 _ROWS_AT_ONCE = 100_000
 _MOVING = ("motion", "gnss", "truth")
 _SHOWN = 40
@@ -214,7 +216,9 @@ def _check_milliseconds(table: str, rows: pd.DataFrame, found: TableFaults) -> N
     speed_mps = moved_m / (time[-1] - time[0])
     if between_s >= _SELDOM_S and moved_m >= _SOMEWHERE_M and speed_mps < _SLOW_MPS:
         got = f"{between_s:g} between rows, hence {speed_mps:.2g} m/s"
-        found.add(", time_s", "seconds", got, "milliseconds for s")
+        words, unit = next(of for least_s, *of in _UNITS if between_s >= least_s)
+        hint = f"{words} for s; a CSV may have them in a column time_{unit}"
+        found.add(", time_s", "seconds", got, hint)
 
 
 def _sorted_unique(

@@ -111,7 +111,7 @@ def test_speeds_just_below_0_are_noise_where_others_are_five_times_as_large(valu
         ("positions", "lat_deg", 601_702_000.0, "degrees times 1e6 or 1e7"),
         ("positions", "lon_deg", 180.1, "degrees east of 0 to 360; take 360 from those above 180"),
         ("positions", "lon_deg", 360.1, "degrees and minutes as one number (NMEA), or metres"),
-        ("positions", "lon_deg", 2.1e9, ""),
+        ("positions", "lon_deg", 2.2e9, ""),
         ("radio", "level_dbm", 4.0, "signal bars; name the column bars"),
         ("radio", "level_dbm", 31.0, "ASU of GSM (dBm = 2 ASU - 113), or raw RXLEV"),
         ("radio", "level_dbm", 63.0, "raw RXLEV (dBm = RXLEV - 110), ASU (LTE: dBm = ASU - 140)"),

@@ -243,7 +243,7 @@ def test_why_positions_are_none_is_said_where_they_are_needed(tmp_path):
     (tmp_path / "e7.csv").write_text("\n".join(["time_s,lat,lon,cell,level_dbm", *rows]))
     given = ("replay", "--log", tmp_path / "e7.csv", "--filter", "ekf", "--out", tmp_path / "out")
     told = (
-        "none used of 60 rows: lat_deg: not degrees in -90..90 (likely: degrees times 1e6 or 1e7)"
+        "none used of 60 rows: lat_deg: not degrees in -90..90 (likely: degrees times 1e6 or 1e7; "
     )
     done = mapfilter(*given)
     assert_refused(done, "'e7.csv': expected positions", told, "cells.plan, or --db")

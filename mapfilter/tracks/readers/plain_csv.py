@@ -15,6 +15,7 @@ from mapfilter.tracks.readers.plain.attitude import add_attitude
 from mapfilter.tracks.readers.plain.cells import add_cells
 from mapfilter.tracks.readers.plain.dates import with_dates
 from mapfilter.tracks.readers.plain.fields import FIELDS, usual_fields
+from mapfilter.tracks.readers.plain.fix_states import fix_column
 from mapfilter.tracks.readers.plain.headers import stated_fields
 from mapfilter.tracks.readers.plain.mapped import (
     NAMED_CELLS,
@@ -100,6 +101,8 @@ def read_columns(rows: Columns, reading: Reading, options: ReadOptions) -> None:
     hemispheres = hemisphere_columns(rows, mapped.taken)
     week = week_column(mapped)
     beside = (*mapped.beside, *hemispheres.values(), *([week] if week else []))
+    if mapped.has("lat_deg", "lon_deg") and (fix := fix_column(rows, mapped.taken)):
+        beside += (fix,)
     mapped = replace(mapped, beside=beside)
     _note_repeated(mapped, reading)
     reading.named = tuple(mapped.own)

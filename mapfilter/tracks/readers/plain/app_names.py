@@ -1,23 +1,121 @@
-"""Names of columns that mean something in the tables of one app only."""
+"""Names of columns that mean something in the tables of one program only."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from mapfilter.tracks.readers.plain.date_parts import of_parts, parts_of_dates
 from mapfilter.tracks.readers.texts.columns import Columns
 
+_FIT_EPOCH_S = 631_065_600
+"""Unix time of 31 December 1989, from which FIT counts seconds."""
+_FIT_TIME = "record.timestamp[s]"
+
+
+@dataclass(frozen=True)
+class _Program:
+    """Names in the tables of a program, in words and with their units.
+
+    Parameters
+    ----------
+    note : str
+        What the names are taken for.
+    marks : frozenset of str
+        Names that tell such a table.
+    meant : mapping of str to str
+        Names in words, by those of the program.
+    """
+
+    note: str
+    marks: frozenset[str]
+    meant: Mapping[str, str]
+
+
+def _axes(sensor: str, of: str) -> dict[str, str]:
+    return {f"field.{of}.{axis}": f"{sensor}_{axis}" for axis in "xyz"}
+
+
 _FORCES = ("gfx", "gfy", "gfz")
-_PHYSICS_TOOLBOX = {
-    **{name: f"acc_{name[-1]} [g]" for name in _FORCES},
-    **{f"b{axis}": f"mag_{axis} [ut]" for axis in "xyz"},
-    "p": "pressure [hpa]",
-}
-"""Forces in g, the magnetic field in µT, the pressure in hPa."""
+_PROGRAMS = (
+    # Forces in g, the magnetic field in µT, the pressure in hPa.
+    _Program(
+        "gfx, gfy, gfz: taken for forces in g, as of Physics Toolbox",
+        frozenset(_FORCES),
+        {
+            **{name: f"acc_{name[-1]} [g]" for name in _FORCES},
+            **{f"b{axis}": f"mag_{axis} [ut]" for axis in "xyz"},
+            "p": "pressure [hpa]",
+        },
+    ),
+    # The velocity of an odometry is that of its own frame, ahead and to the left (REP 105).
+    _Program(
+        "columns as of an odometry of ROS (rostopic echo -p)",
+        frozenset(("%time", "field.child_frame_id", "field.twist.twist.linear.x")),
+        {
+            "%time": "time",
+            "field.twist.twist.linear.x": "wheel speed [m/s]",
+            "field.twist.twist.angular.z": "yaw rate [rad/s]",
+        },
+    ),
+    _Program(
+        "columns as of positions of ROS (rostopic echo -p)",
+        frozenset(("%time", "field.latitude", "field.longitude")),
+        {"%time": "time", **{f"field.{n}": n for n in ("latitude", "longitude", "altitude")}},
+    ),
+    _Program(
+        "columns as of an inertial sensor of ROS (rostopic echo -p)",
+        frozenset(("%time", "field.angular_velocity.x", "field.linear_acceleration.x")),
+        {
+            "%time": "time",
+            **_axes("gyr", "angular_velocity"),
+            **_axes("acc", "linear_acceleration"),
+        },
+    ),
+    _Program(
+        "columns as of positions of PX4 (degrees times 1e7, mm)",
+        frozenset(("time_utc_usec", "lat", "lon", "fix_type")),
+        {
+            "lat": "lat [dege7]",
+            "lon": "lon [dege7]",
+            "alt": "altitude [mm]",
+            "eph": "accuracy [m]",
+            "vel_m_s": "speed [m/s]",
+        },
+    ),
+    _Program(
+        "columns as of positions of ArduPilot",
+        frozenset(("timeus", "gms", "lat", "lng")),
+        {"alt": "altitude [m]", "spd": "speed [m/s]", "gcrs": "course [deg]"},
+    ),
+    _Program(
+        "columns as of NAV-PVT of u-blox (mm, mm/s)",
+        frozenset(("itow", "lat", "lon", "gspeed")),
+        {
+            "hmsl": "altitude [mm]",
+            "hacc": "accuracy [mm]",
+            "gspeed": "speed [mm/s]",
+            "headmot": "course [deg]",
+        },
+    ),
+    _Program(
+        "columns as of records of FIT (semicircles, seconds since 1989-12-31)",
+        frozenset((_FIT_TIME, "record.position_lat[semicircles]")),
+        {
+            _FIT_TIME: "time",
+            "record.position_lat[semicircles]": "lat [semicircles]",
+            "record.position_long[semicircles]": "lon [semicircles]",
+            **{f"record.{n}altitude[m]": "altitude [m]" for n in ("enhanced_", "")},
+            **{f"record.{n}speed[m/s]": "speed [m/s]" for n in ("enhanced_", "")},
+        },
+    ),
+)
 
 
 def full_names(names: Sequence[str], own: Collection[str] = ()) -> tuple[str, ...]:
-    """Return names of columns with those of an app in words; those of ``own`` stay.
+    """Return names of columns with those of a program in words; those of ``own`` stay.
 
     Examples
     --------
@@ -26,15 +124,42 @@ def full_names(names: Sequence[str], own: Collection[str] = ()) -> tuple[str, ..
     >>> full_names(["time", "p"])
     ('time', 'p')
     """
-    if not set(_FORCES) <= set(names):
-        return tuple(names)
-    return tuple(name if name in own else _PHYSICS_TOOLBOX.get(name, name) for name in names)
+    known = _program(names)
+    found = tuple(names)
+    if known is not None:
+        meant = {name: word for name, word in known.meant.items() if name not in own}
+        # Of names that mean the same the first one is read.
+        words = [meant[name] for name in names if name in meant]
+        first = {meant[name]: name for name in reversed(names) if name in meant}
+        twice = {word for word in words if words.count(word) > 1}
+        found = tuple(
+            meant[name]
+            if name in meant and (meant[name] not in twice or first[meant[name]] == name)
+            else name
+            for name in names
+        )
+    return of_parts(found, own)
 
 
 def with_full_names(rows: Columns, own: Collection[str]) -> Columns:
-    """Return columns of which the names of an app are in words, with a note."""
+    """Return columns of which the names of a program are in words, with a note.
+
+    Times in parts (year, month, …) become one column.
+    """
+    known = _program(rows.names)
     names = full_names(rows.names, own)
     if names == rows.names:
         return rows
-    rows.reading.note("gfx, gfy, gfz: taken for forces in g, as of Physics Toolbox")
-    return replace(rows, names=names)
+    if known is not None:
+        rows.reading.note(known.note)
+        if _FIT_TIME in known.marks and _FIT_TIME not in own:
+            rows = rows.filled(_FIT_TIME, _texts(rows.number(_FIT_TIME) + _FIT_EPOCH_S))
+    return replace(parts_of_dates(rows, own), names=names)
+
+
+def _program(names: Sequence[str]) -> _Program | None:
+    return next((one for one in _PROGRAMS if one.marks <= set(names)), None)
+
+
+def _texts(numbers: np.ndarray) -> np.ndarray:
+    return np.where(np.isfinite(numbers), numbers.astype(np.str_), "").astype(object)

@@ -16,7 +16,7 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
         *("tow", "gps tow", "time of week", "gps time of week"),
     ),
     "lat_deg": ("latitude", "lat", "gps latitude", "gps lat"),
-    "lon_deg": ("longitude", "lon", "lng", "long", "gps longitude", "gps lon"),
+    "lon_deg": ("longitude", "lon", "lng", "long", "gps longitude", "gps lon", "gps long"),
     "altitude_m": (
         "altitude",
         "alt",
@@ -163,6 +163,30 @@ def stated_fields(
             if rank < ranks.get(field, len(QUANTITIES[field])):
                 found[field], ranks[field] = name, rank
     return {field: found[field] for field in QUANTITIES if field in found}
+
+
+def columns_of(field: str, names: Sequence[str], taken: Collection[str]) -> list[str]:
+    """Return all columns whose headers state the quantity and a unit of a field.
+
+    Parameters
+    ----------
+    field : str
+    names : sequence of str
+        Of the columns, in lower case.
+    taken : collection of str
+        Columns of fields.
+
+    Examples
+    --------
+    >>> columns_of("time", ["time(millisecond)", "datetime(utc)", "lat"], ())
+    ['time(millisecond)', 'datetime(utc)']
+    """
+    parted = ((name, *parted_unit(name)) for name in names)
+    return [
+        name
+        for name, text, unit in parted
+        if name not in taken and field in _fields_of(text) and _fits(field, unit)
+    ]
 
 
 def fields_meant(column: str) -> tuple[str, ...]:

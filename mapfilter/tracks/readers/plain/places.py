@@ -11,6 +11,7 @@ from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.tracks.joining.position_units import UERE_M
 from mapfilter.tracks.readers.plain.fields import column_option
+from mapfilter.tracks.readers.plain.fix_states import fix_column, without_fix
 from mapfilter.tracks.readers.plain.mapped import Mapped, add_rows
 from mapfilter.tracks.readers.plain.odometry import speeds_of
 from mapfilter.tracks.readers.recorded.reading import Reading
@@ -81,6 +82,10 @@ def add_places(
         columns["accuracy_m"] = np.where(np.isnan(stated_m), by_hdop_m, stated_m)
     columns["course_deg"] = _within_turn(columns["course_deg"])
     there = np.isfinite(columns["lat_deg"]) | np.isfinite(columns["lon_deg"])
+    if column := fix_column(mapped.rows, mapped.taken):
+        none = there & without_fix(mapped.rows, column, reading)
+        reading.refuse(mapped.rows.line[none], f"no fix, by column {column}")
+        there &= ~none
     columns |= {"time_s": time_s, "speed_mps": speeds_of(mapped, "speed")}
     add_rows(reading, "positions", columns, mapped.rows, there)
 

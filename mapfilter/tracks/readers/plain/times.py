@@ -25,6 +25,7 @@ from mapfilter.tracks.readers.clocks.times import (
     without_midnights,
 )
 from mapfilter.tracks.readers.format import ReadOptions
+from mapfilter.tracks.readers.plain.headers import columns_of
 from mapfilter.tracks.readers.plain.mapped import Mapped
 from mapfilter.tracks.readers.plain.weeks import (
     over_days,
@@ -119,6 +120,8 @@ def _best_column(mapped: Mapped, reading: Reading) -> Mapped:
     others that can be read. Later parts of a large file are read as the first one.
     """
     there = [name for name in mapped.names("time") if name in mapped.rows.names]
+    names = [name for name in mapped.rows.names if mapped.rows.names.count(name) == 1]
+    there += columns_of("time", names, {*mapped.taken, *mapped.beside, *there})
     if len(there) < 2 or "time" in mapped.own:
         return mapped
     if "time" not in reading.columns:
@@ -129,6 +132,9 @@ def _best_column(mapped: Mapped, reading: Reading) -> Mapped:
 
 def _best_of(there: list[str], rows: Columns, reading: Reading) -> str:
     certain = {name: _certainty(name, rows.first_text(name)) for name in there}
+    if certain[there[0]] and np.unique(rows.texts(there[0])).size == 1 < len(rows):
+        # The start of the recording; what counts from it tells rows apart.
+        there = [name for name in there[1:] if np.unique(rows.texts(name)).size > 1] or there
     better = [name for name in there if certain[name] > certain[there[0]]]
     if better and certain[there[0]]:
         count = {name: np.unique(rows.texts(name)).size for name in (there[0], *better)}

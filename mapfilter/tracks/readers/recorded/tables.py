@@ -23,22 +23,32 @@ def _text(name: str, *, required: bool = False) -> Field:
 
 
 _TIME = Field("time_s", -1e11, 1e11, "seconds", required=True)
-_NO_DEGREES = (
-    (180.0, 18_060.0, "degrees and minutes as one number (NMEA), or metres for degrees"),
-    (18_060.0, 1e7, "metres for degrees"),
-    (1e7, 2e9, "degrees times 1e6 or 1e7"),
-)
+
+
+def _no_degrees(name: str) -> tuple[tuple[float, float, str], ...]:
+    """Return what values of a latitude or longitude may be that are no degrees."""
+    whole = (
+        f"degrees times 1e6 or 1e7; of 1e7 name the column {name} [degE7]; or semicircles of FIT, "
+        f"{name} [semicircles]"
+    )
+    return (
+        (180.0, 18_060.0, "degrees and minutes as one number (NMEA), or metres for degrees"),
+        (18_060.0, 1e7, "metres for degrees"),
+        (1e7, 2.0**31, whole),
+    )
+
+
 _LATITUDE = Field(
     *("lat_deg", -90, 90, "degrees in -90..90"),
     required=True,
-    hints=((90.0, 180.0, "latitude and longitude swapped"), *_NO_DEGREES),
+    hints=((90.0, 180.0, "latitude and longitude swapped"), *_no_degrees("lat")),
 )
 _LONGITUDE = Field(
     *("lon_deg", -180, 180, "degrees in -180..180"),
     required=True,
     hints=(
         (180.0, 360.0, "degrees east of 0 to 360; take 360 from those above 180"),
-        *_NO_DEGREES,
+        *_no_degrees("lon"),
     ),
 )
 _METRES = "metres"

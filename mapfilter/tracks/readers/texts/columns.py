@@ -218,6 +218,11 @@ class Columns:
         both = pc.if_else(pc.equal(second, ""), "", both)
         return replace(self, _columns={**self._columns, self.names.index(name): both})
 
+    def filled(self, name: str, texts: np.ndarray) -> Columns:
+        """Return columns of which one has other texts."""
+        column = pa.chunked_array([pa.array(texts, pa.string())])
+        return replace(self, _columns={**self._columns, self.names.index(name): column})
+
     def number(self, *names: str) -> Floats:
         """Return the first of these columns that is there as numbers, NaN where missing.
 

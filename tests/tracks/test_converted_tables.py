@@ -1,0 +1,203 @@
+"""Tables that converters write of receivers, flight logs, bags and watches, by their own names."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mapfilter.errors import InputError
+from mapfilter.tracks.readers.format import ReadOptions
+from mapfilter.tracks.readers.formats import read_recording
+
+COUNT = 40
+TIME_S = 1_777_629_590.0 + np.arange(COUNT)
+LAT, LON = 60.17 + 1e-5 * np.arange(COUNT), 24.94 + 2e-5 * np.arange(COUNT)
+SPEED, COURSE = 8.0 + 0.01 * np.arange(COUNT), 45.0
+FIT_S = 631_065_600
+SEMICIRCLES = 2**31 / 180
+UTC = pd.to_datetime(TIME_S, unit="s")
+
+ARDUPILOT = {
+    "timestamp": TIME_S,
+    "TimeUS": 80e6 + 1e6 * np.arange(COUNT),
+    "Status": 3,
+    "GMS": 1000 * (np.arange(COUNT) + 5),
+    "GWk": 2416,
+    "Lat": LAT,
+    "Lng": LON,
+    "Alt": 16.0,
+    "Spd": SPEED,
+    "GCrs": COURSE,
+}
+PX4 = {
+    "timestamp": 12_000_000 + 1_000_000 * np.arange(COUNT),
+    "time_utc_usec": (1e6 * TIME_S).astype(np.int64),
+    "lat": np.round(1e7 * LAT).astype(int),
+    "lon": np.round(1e7 * LON).astype(int),
+    "alt": 16_000,
+    "eph": 1.2,
+    "fix_type": 3,
+    "vel_m_s": SPEED,
+    "cog_rad": np.radians(COURSE),
+}
+NAV_PVT = {
+    "iTOW": 1000 * (np.arange(COUNT) + 5),
+    "year": UTC.year,
+    "month": UTC.month,
+    "day": UTC.day,
+    "hour": UTC.hour,
+    "min": UTC.minute,
+    "second": UTC.second,
+    "nano": 0,
+    "lon": LON,
+    "lat": LAT,
+    "hMSL": 16_000,
+    "hAcc": 1200,
+    "gSpeed": 1000 * SPEED,
+    "headMot": COURSE,
+}
+BAG = {
+    "%time": (TIME_S * 1e9).astype(np.int64),
+    "field.header.seq": np.arange(COUNT),
+    "field.latitude": LAT,
+    "field.longitude": LON,
+    "field.altitude": 16.0,
+}
+WATCH = {
+    "record.timestamp[s]": (TIME_S - FIT_S).astype(int),
+    "record.position_lat[semicircles]": np.round(LAT * SEMICIRCLES).astype(int),
+    "record.position_long[semicircles]": np.round(LON * SEMICIRCLES).astype(int),
+    "record.altitude[m]": 16.0,
+    "record.speed[m/s]": SPEED,
+    "record.heart_rate[bpm]": 90,
+}
+TABLES = {"ardupilot": ARDUPILOT, "px4": PX4, "nav-pvt": NAV_PVT, "bag": BAG, "watch": WATCH}
+
+
+def read(tmp_path, columns, **own):
+    path = tmp_path / "converted.csv"
+    pd.DataFrame(columns).to_csv(path, index=False)
+    return read_recording(path, options=ReadOptions(columns=own))
+
+
+@pytest.mark.parametrize("program", TABLES)
+def test_positions_are_read_by_the_names_of_the_program(tmp_path, program):
+    """They were refused, or lost their speeds."""
+    found = read(tmp_path, TABLES[program])
+    places = found.tables["positions"]
+    assert found.clock.kind == "utc"
+    np.testing.assert_allclose(places["time_s"], TIME_S, atol=1e-3)
+    np.testing.assert_allclose(places["lat_deg"], LAT, atol=2e-7)
+    np.testing.assert_allclose(places["lon_deg"], LON, atol=2e-7)
+    np.testing.assert_allclose(places["altitude_m"], 16.0)
+    if program != "bag":
+        np.testing.assert_allclose(places["speed_mps"], SPEED, atol=1e-3)
+    if program in ("ardupilot", "nav-pvt"):
+        np.testing.assert_allclose(places["course_deg"], COURSE)
+    if program in ("px4", "nav-pvt"):
+        np.testing.assert_allclose(places["accuracy_m"], 1.2)
+
+
+def test_fractions_of_seconds_and_days_are_those_of_the_receiver(tmp_path):
+    """Its seconds are rounded, so that their fraction may be negative."""
+    nano = np.where(np.arange(COUNT) % 2, 200_000_000, -1000)
+    found = read(tmp_path, NAV_PVT | {"nano": nano})
+    np.testing.assert_allclose(found.tables["positions"]["time_s"], TIME_S + 1e-9 * nano, atol=1e-6)
+
+
+def test_times_in_parts_without_a_receivers_clock_are_local(tmp_path):
+    parts = {name: NAV_PVT[name] for name in ("year", "month", "day", "hour", "min", "second")}
+    table = {**parts, "latitude": LAT, "longitude": LON}
+    found = read(tmp_path, table)
+    assert found.clock.kind == "local"
+    np.testing.assert_allclose(found.tables["positions"]["time_s"], TIME_S)
+    bad = {**table, "month": np.where(np.arange(COUNT) == 3, 13, UTC.month)}
+    assert len(read(tmp_path, bad).tables["positions"]) == COUNT - 1
+
+
+def test_odometry_of_a_bag_is_that_of_the_vehicle(tmp_path):
+    rate = 0.1 * np.sin(np.arange(COUNT))
+    columns = {
+        "%time": (TIME_S * 1e9).astype(np.int64),
+        "field.child_frame_id": "base_link",
+        "field.twist.twist.linear.x": SPEED,
+        "field.twist.twist.angular.z": rate,
+    }
+    odometry = read(tmp_path, columns).tables["odometry"]
+    np.testing.assert_allclose(odometry["speed_mps"], SPEED)
+    np.testing.assert_allclose(odometry["yaw_rate_radps"], rate)
+    # Without a frame of its own the velocity may be that to the east.
+    del columns["field.child_frame_id"]
+    with pytest.raises(InputError, match="expected a recording in a known format"):
+        read(tmp_path, columns)
+
+
+def test_columns_that_a_user_names_keep_their_names(tmp_path):
+    found = read(tmp_path, BAG, time="%time", lat_deg="field.latitude", lon_deg="field.longitude")
+    np.testing.assert_allclose(found.tables["positions"]["lat_deg"], LAT)
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor"), [("degE7", 1e7), ("1e-7 deg", 1e7), ("semicircles", SEMICIRCLES)]
+)
+def test_degrees_in_whole_numbers_are_read_by_their_unit(tmp_path, unit, factor):
+    columns = {
+        "time": UTC.strftime("%Y-%m-%dT%H:%M:%SZ"),
+        f"lat [{unit}]": np.round(factor * LAT).astype(int),
+        f"lon [{unit}]": np.round(factor * LON).astype(int),
+    }
+    places = read(tmp_path, columns).tables["positions"]
+    np.testing.assert_allclose(places["lat_deg"], LAT, atol=2e-7)
+    np.testing.assert_allclose(places["time_s"], TIME_S)
+
+
+def test_whole_numbers_without_a_unit_name_both_that_they_may_have(tmp_path):
+    """Those of a watch, taken for degrees times 1e7, lay ten degrees off."""
+    table = {"time": TIME_S, "lat": WATCH["record.position_lat[semicircles]"], "lon": 1e7 * LON}
+    with pytest.raises(InputError, match=r"name the column lat \[degE7\]; or semicircles of FIT"):
+        read(tmp_path, table)
+
+
+JAMMED = np.arange(COUNT) >= COUNT // 2
+
+
+@pytest.mark.parametrize(
+    ("table", "column", "fix", "none"),
+    [
+        (PX4, "fix_type", 3, 0),
+        (PX4, "fix_type", 3, 1),
+        (ARDUPILOT, "Status", 4, 1),
+        (NAV_PVT, "fixType", 3, 1),
+        (NAV_PVT, "gnssFixOk", 1, 0),
+        (NAV_PVT, "gnssFixOk", True, False),
+        (BAG, "field.status.status", 0, -1),
+        ({"time": TIME_S, "latitude": LAT, "longitude": LON}, "fix_type", 1, 0),
+        ({"time": TIME_S, "latitude": LAT, "longitude": LON}, "fix", "3D", "NO_FIX"),
+        ({"time": TIME_S, "latitude": LAT, "longitude": LON}, "fix_quality", 1, 0),
+    ],
+)
+def test_positions_that_a_receiver_states_to_be_none_are_left_out(
+    tmp_path, table, column, fix, none
+):
+    """While it is jammed it repeats the last one, which was taken for measured."""
+    states = pd.Series([fix] * COUNT, dtype=object).where(~JAMMED, none)
+    found = read(tmp_path, {**table, column: states})
+    np.testing.assert_allclose(found.tables["positions"]["time_s"], TIME_S[~JAMMED], atol=1e-3)
+    assert [(one.count, one.reason) for one in found.unusable] == [
+        (JAMMED.sum(), f"no fix, by column {column.lower()}")
+    ]
+    assert not any(column.lower() in text for text in found.unread)
+
+
+@pytest.mark.parametrize("states", [0, 1, np.arange(COUNT) % 2, "gps"])
+def test_states_that_tell_nothing_of_a_fix_leave_all_positions(tmp_path, states):
+    """Of a column that is always 0 nothing is known; one in which 1 is the best is a flag."""
+    table = {"time": TIME_S, "latitude": LAT, "longitude": LON, "fix_type": states}
+    places = read(tmp_path, table).tables["positions"]
+    assert len(places) == (COUNT if np.ndim(states) == 0 else COUNT // 2)
+
+
+def test_motion_in_rows_without_a_fix_counts(tmp_path):
+    table = {"time": TIME_S, "lat": LAT, "lon": LON, "wheel_speed_mps": SPEED}
+    found = read(tmp_path, {**table, "fix_type": np.where(JAMMED, 0, 3)})
+    assert len(found.tables["odometry"]) == COUNT
+    assert len(found.tables["positions"]) == (~JAMMED).sum()
