@@ -36,6 +36,7 @@ from mapfilter.positioning.log_lacks import (
     check_places,
     coarse_pixels_note,
     follows_positions,
+    has_reports_alone,
     is_of_reports_alone,
     lack_of_log,
 )
@@ -282,5 +283,7 @@ def _not_located(
         remedies.append("mf.locate_reports needs none")
     if NO_MOTION in lack and len(log.gnss):
         remedies.append('filter="ekf" needs none beside positions')
+    if NO_MOTION not in lack and database is not None and has_reports_alone(log):
+        remedies.append("mf.locate_reports locates each report by itself")
     remedy = f" ({'; '.join(remedies)})" if remedies else ""
     return (f"nothing is located: {lack}{remedy}",) if lack else ()

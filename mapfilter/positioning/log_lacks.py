@@ -82,10 +82,13 @@ def is_of_reports_alone(log: TrackLog, options: Any, estimate: TrackEstimate) ->
     Without motion and positions each report can be located by itself as well, or better.
     """
     by_map = isinstance(options, BayesFilter) or getattr(options, "name", "") in _BY_CELLS
-    if estimate.converged_at is None or not by_map or log.radio.empty:
-        return False
-    placed = any(len(one) for one in (log.gnss, log.pseudoranges, log.tdoa))
-    return not (placed or log.motion["step_m"].notna().any())
+    return estimate.converged_at is not None and by_map and has_reports_alone(log)
+
+
+def has_reports_alone(log: TrackLog) -> bool:
+    """Return whether a log has reports of cells, and neither motion nor positions nor ranges."""
+    others = (log.gnss, log.pseudoranges, log.tdoa, log.motion["step_m"].dropna())
+    return len(log.radio) > 0 and not any(map(len, others))
 
 
 def _unused_ranges(log: TrackLog) -> str:

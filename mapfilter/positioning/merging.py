@@ -11,7 +11,9 @@ import pandas as pd
 
 from mapfilter._arguments import Argument, check_arguments
 from mapfilter.filters.contract import MotionStep
+from mapfilter.geodesy import projected_crs
 from mapfilter.positioning.epochs import Difference, Epoch, GnssFix, Pseudorange, ReportRow
+from mapfilter.tracks.checks.placeless import in_frame
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.schema import SCHEMA, TABLES
 
@@ -19,15 +21,28 @@ _AT_ONCE = 20_000
 """Rows of a table that are taken out of it at a time: as objects they are ten times as large."""
 
 
-def epochs(log: TrackLog) -> list[Epoch]:
+def epochs(log: TrackLog, crs: str = "") -> list[Epoch]:
     """Merge a log's tables by time.
+
+    Parameters
+    ----------
+    crs : str
+        CRS of the filter that takes them, such as ``database.lattice.crs``: a log in another one is
+        projected. Epochs state none; "" for that of the log.
 
     Raises
     ------
     ConfigError
-        It is no log.
+        It is no log, or the CRS no text.
+    InputError
+        The CRS is none, or covers none of the positions.
     """
-    check_arguments("epochs", Argument("log", log, TrackLog, "a log of read_log or make_log"))
+    check_arguments(
+        "epochs",
+        Argument("log", log, TrackLog, "a log of read_log or make_log"),
+        Argument("crs", crs, str, "a CRS such as database.lattice.crs"),
+    )
+    log = in_frame(log, projected_crs(crs, "epochs, crs")) if crs else log
     tables = {_FIELDS[name]: _by_time(log, name) for name, table in TABLES.items() if table.kinds}
     ahead = dict.fromkeys(tables, 0)
     merged = []

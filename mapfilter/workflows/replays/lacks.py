@@ -25,6 +25,7 @@ from mapfilter.positioning.log_lacks import (
     check_places,
     coarse_pixels_note,
     follows_positions,
+    has_reports_alone,
     is_of_reports_alone,
     lack_of_log,
 )
@@ -88,7 +89,8 @@ def lack_of(
     """
     lack = lack_of_log(log, options, estimate, database)
     if NO_MOTION not in lack:
-        return lack
+        alone = lack and database is not None and has_reports_alone(log)
+        return f"{lack} (mapfilter locate locates each report by itself)" if alone else lack
     remedies = []
     if made := _made_of_course(opened):
         remedies.append(made)
