@@ -81,9 +81,9 @@ def leave_out(log: TrackLog, kinds: Collection[Without]) -> TrackLog:
 
 def _check_kinds(kinds: object) -> None:
     known = get_args(Without)
-    listed = isinstance(kinds, Collection) and not isinstance(kinds, str)
-    for one in kinds if listed else [kinds]:
-        if listed and one in known:
+    given = kinds if isinstance(kinds, Collection) and not isinstance(kinds, str) else None
+    for one in [kinds] if given is None else given:
+        if given is not None and one in known:
             continue
         expected, near = f"a list, each of {', '.join(known)}", ""
         if isinstance(one, str):

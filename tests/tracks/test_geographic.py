@@ -34,7 +34,7 @@ def test_positions_in_degrees_are_those_of_the_crs():
 
 
 @pytest.mark.parametrize("degrees", [False, True])
-def test_an_accuracy_counts_beside_metres_too(degrees, tmp_path):
+def test_an_accuracy_counts_beside_metres_too(degrees):
     given = make_log(CRS, gnss=positions()).gnss[["time_s", "east_m", "north_m"]]
     if degrees:
         given = given.assign(lat_deg=LAT, lon_deg=LON)
