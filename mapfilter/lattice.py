@@ -7,7 +7,7 @@ corner, as in GDAL.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, nan
 from numbers import Real
 from typing import Any
 
@@ -25,7 +25,8 @@ class Lattice:
     Parameters
     ----------
     crs : str
-        Projected, in metres, as :func:`mapfilter.geodesy.projected_crs` returns it.
+        Projected, in metres, in any form that pyproj knows; kept as
+        :func:`mapfilter.geodesy.projected_crs` returns it.
     west_m, north_m : float
         Outer corner of pixel (0, 0).
     resolution_m : float
@@ -57,14 +58,15 @@ class Lattice:
     cols: int
 
     def __post_init__(self) -> None:
-        for name in ("west_m", "north_m"):
+        for name in ("west_m", "north_m", "resolution_m", "rows", "cols"):
             value: Any = getattr(self, name)
-            # As `project` returns the coordinates of a place; an array has no hash.
-            if isinstance(value, np.ndarray) and value.ndim == 0:
+            # As `project` returns the coordinates of a place; an array has no hash, and files of a
+            # database know no numbers of NumPy.
+            if isinstance(value, np.ndarray | np.generic) and value.ndim == 0:
                 object.__setattr__(self, name, value.item())
         faults = Faults()
         try:
-            projected_crs(self.crs, "lattice crs")
+            object.__setattr__(self, "crs", projected_crs(self.crs, "lattice crs"))
         except InputError as error:
             faults.found.extend(error.faults)
         if not (_is_finite(self.west_m) and _is_finite(self.north_m)):
@@ -89,8 +91,8 @@ class Lattice:
         cls, crs: str, bounds_m: tuple[float, float, float, float], resolution_m: float
     ) -> Lattice:
         """Return the lattice over west, south, east, north (m), snapped out to the resolution."""
-        west, south, east, north = bounds_m
-        if not (np.isfinite([*bounds_m, resolution_m]).all() and resolution_m > 0):
+        west, south, east, north = checked_bounds(bounds_m, "lattice")
+        if not (np.isfinite(resolution_m) and resolution_m > 0):
             got = f"{bounds_m} m at {resolution_m} m"
             raise fail(InputError, "lattice", "finite bounds and a resolution > 0", got)
         first_col, last_col = np.floor(west / resolution_m), np.ceil(east / resolution_m)
@@ -174,6 +176,23 @@ class Lattice:
             and abs(self.north_m - other.north_m) <= tolerance_m
             and same_crs(self.crs, other.crs)
         )
+
+
+def checked_bounds(bounds_m: Any, where: str) -> tuple[float, float, float, float]:
+    """Return west, south, east and north as numbers.
+
+    Raises
+    ------
+    InputError
+        They are not four finite numbers.
+    """
+    try:
+        west, south, east, north = (float(one) for one in bounds_m)
+    except (TypeError, ValueError):
+        west = south = east = north = nan
+    if not all(map(isfinite, (west, south, east, north))):
+        raise fail(InputError, where, "west, south, east, north in metres", bounds_m)
+    return west, south, east, north
 
 
 def outside_m(east_m: Floats, north_m: Floats, lattice: Lattice) -> Floats:

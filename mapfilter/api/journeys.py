@@ -10,7 +10,7 @@ from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters
 from mapfilter.roads.network import StreetNetwork, street_network
 from mapfilter.roads.osm import Profile
-from mapfilter.roads.routes import read_roads
+from mapfilter.roads.routes import ROADS_EXPECTED, read_roads
 from mapfilter.roads.vector import Layer
 from mapfilter.roads.ways import Ways
 from mapfilter.simulation.journeys import JourneyPlan
@@ -116,7 +116,7 @@ def rasters_argument(value: object) -> Argument:
 
 def roads_argument(value: object) -> Argument:
     """Return a map or its ways, to be checked."""
-    return Argument("roads", value, Layer | PATH | Ways, "a map's path or name, or ways")
+    return Argument("roads", value, Layer | PATH | Ways, ROADS_EXPECTED)
 
 
 def network_of(roads: Layer | Ways, rasters: RxLevRasters, profile: Profile) -> StreetNetwork:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from html import escape
 from numbers import Real
@@ -47,7 +47,9 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.checks.placeless import in_frame
 from mapfilter.tracks.checks.range_units import with_range_notes
 from mapfilter.tracks.joining.identify import name_by_plan
+from mapfilter.tracks.kinds import leave_out
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.schema import Without
 from mapfilter.viewing.notebook import View
 from mapfilter.viewing.runs import ViewedRun
 from mapfilter.viewing.trace import TraceRecorder
@@ -162,6 +164,7 @@ def locate(
     risk: float = DEFAULT_RISK,
     record: bool = False,
     factors: Mapping[str, float] | None = None,
+    without: Collection[Without] = (),
 ) -> Track:
     """Locate a log from an unknown start.
 
@@ -199,6 +202,9 @@ def locate(
     factors : mapping of str to float, optional
         By which columns of motion are multiplied, as of :func:`mapfilter.read_log`. One of 1 takes
         a column as it is, although the log's fixes contradict it.
+    without : collection of str
+        Measurements that are left out, such as ``["gnss", "ta"]``: see
+        :func:`mapfilter.tracks.kinds.leave_out`.
 
     Raises
     ------
@@ -232,6 +238,7 @@ def locate(
     about_deg = None if plan is None else plan.middle_deg
     about_deg = about_deg if database is None else database.lattice.middle_deg
     log = with_right_motion(log, "" if plan is None else plan.crs, about_deg, factors or {})
+    log = leave_out(log, without)
     if plan is None:
         log, plan = without_sites(log), CellPlan(log.crs, ())
     else:

@@ -21,7 +21,7 @@ from mapfilter.database.measured_files import read_measured
 from mapfilter.database.parquet import WindowReader, check_places, read_columns
 from mapfilter.database.points import Points, read_points, way_columns
 from mapfilter.errors import InputError, fail
-from mapfilter.lattice import Lattice
+from mapfilter.lattice import Lattice, checked_bounds
 from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.ways import Bounds
 
@@ -231,7 +231,7 @@ class RadioRouteDatabase:
     def _window(self, bounds_m: Bounds | None) -> tuple[int, int, Lattice]:
         if bounds_m is None:
             return 0, 0, self.lattice
-        west, south, east, north = bounds_m
+        west, south, east, north = checked_bounds(bounds_m, "area")
         top, left = self.lattice.row_col(west, north)
         bottom, right = self.lattice.row_col(east, south)
         top, left = max(top, 0), max(left, 0)

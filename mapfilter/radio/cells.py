@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
 
+from mapfilter._arguments import shown
 from mapfilter._io import atomic_file
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail
@@ -138,7 +139,7 @@ class CellPlan:
             object.__setattr__(self, "crs", projected_crs(self.crs, "cell plan, crs"))
         except InputError as error:
             faults.found.extend(error.faults)
-        object.__setattr__(self, "cells", tuple(self.cells))
+        object.__setattr__(self, "cells", _as_cells(self.cells))
         check_cells(self.cells, lambda i, name: f"cell {self.cells[i].id!r}, {name}", faults)
         faults.raise_if_any(InputError)
 
@@ -208,6 +209,17 @@ class CellPlan:
         moved = zip(self.cells, east_m.tolist(), north_m.tolist(), strict=True)
         cells = tuple(replace(c, east_m=e, north_m=n) for c, e, n in moved)
         return CellPlan(target, cells, self.notes, self.inactive)
+
+
+def _as_cells(given: object) -> tuple[Cell, ...]:
+    """Return cells as a tuple; InputError for what is no cell."""
+    table = hasattr(given, "columns")
+    cells = tuple(given) if isinstance(given, Iterable) and not table else (given,)
+    wrong = [one for one in cells if not isinstance(one, Cell)]
+    if wrong:
+        hint = "a table; read_cell_plan reads a CSV of it" if table else ""
+        raise fail(InputError, "cell plan", "cells, each a Cell", shown(wrong[0]), hint)
+    return tuple(one for one in cells if isinstance(one, Cell))
 
 
 def check_cells(

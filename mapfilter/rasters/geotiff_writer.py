@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 import rasterio
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 from rasterio._err import CPLE_BaseError
 from rasterio.errors import RasterioError
 from rasterio.io import DatasetWriter
@@ -18,7 +18,7 @@ from rasterio.shutil import copy as copy_raster
 
 from mapfilter._gdal import open_raster, reason_of
 from mapfilter._io import atomic_file
-from mapfilter.errors import InputError, MapfilterError, OutputError, fail
+from mapfilter.errors import InputError, MapfilterError, OutputError, fail, listed
 from mapfilter.lattice import Lattice
 from mapfilter.rasters.files import Quantity
 from mapfilter.rasters.geotiff import QUANTITY_TAG
@@ -102,8 +102,8 @@ def new_geotiff(
 def write_rasters(
     path: Path | str,
     lattice: Lattice,
-    items: Iterable[tuple[str, NDArray[Any]]],
-    cell_ids: Sequence[str],
+    items: Mapping[str, ArrayLike] | Iterable[tuple[str, ArrayLike]],
+    cell_ids: Sequence[str] | None = None,
     tags: Mapping[str, str] | None = None,
     *,
     quantity: Quantity = "level",
@@ -116,32 +116,43 @@ def write_rasters(
     ----------
     path : Path or str
         Ends in .tif or .tiff.
-    items : iterable of (cell id, array of shape (rows, cols))
-        In the order of ``cell_ids``.
-    cell_ids : sequence of str
-        The band descriptions.
+    items : mapping of cell id to array, or iterable of (cell id, array)
+        Arrays of shape (rows, cols); masked pixels are nodata. An iterable, which may make one
+        after the other, is in the order of ``cell_ids``.
+    cell_ids : sequence of str, optional
+        The band descriptions; of a mapping all cells in their order when left out.
     tags : mapping of str to str, optional
         Free text kept in the file, such as how it was predicted.
 
     Raises
     ------
     InputError
-        An item is not the cell that is next, or has another shape.
+        An item is not the cell that is next, or has another shape; a cell has none.
     OutputError
         The file cannot be written.
     """
+    if isinstance(items, Mapping):
+        cell_ids = list(items) if cell_ids is None else cell_ids
+        if lacking := [cell_id for cell_id in cell_ids if cell_id not in items]:
+            got = f"none of {listed(lacking)}"
+            raise fail(InputError, "levels", "an array of each cell", got)
+        of_cells: Mapping[str, ArrayLike] = items
+        items = ((cell_id, of_cells[cell_id]) for cell_id in cell_ids)
+    if cell_ids is None:
+        raise fail(InputError, "cell_ids", "the ids of all cells", "none")
     bands = [(cell_id, "dBm" if quantity == "level" else "dB") for cell_id in cell_ids]
     tags = {**(tags or {}), QUANTITY_TAG: quantity}
     count, pixels = 0, hashlib.sha256()
     with new_geotiff(Path(path), lattice, bands, tags, overviews="average") as target:
-        for count, (cell_id, values) in enumerate(items, start=1):
+        for count, (cell_id, given) in enumerate(items, start=1):
+            values = np.ma.asarray(given, dtype=np.float64).filled(np.nan)
             expected = cell_ids[count - 1] if count <= len(cell_ids) else "no more cells"
             if cell_id != expected:
                 raise fail(InputError, f"band {count}", repr(expected), repr(cell_id))
             if values.shape != (lattice.rows, lattice.cols):
                 shape = f"{lattice.rows} x {lattice.cols} pixels"
                 raise fail(InputError, f"band {count} ({cell_id})", shape, values.shape)
-            rounded = np.round(np.asarray(values, dtype=np.float64), 2).astype(np.float32)
+            rounded = np.round(values, 2).astype(np.float32)
             rounded[~np.isfinite(rounded)] = np.nan
             target.write(rounded, count)
             pixels.update(rounded.tobytes())

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +13,21 @@ from mapfilter._types import Bools, Floats, Floats32, Ints, Ints32
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.lattice import Lattice
 
+_COLUMNS: Mapping[str, type[np.generic]] = {
+    "row": np.int32,
+    "col": np.int32,
+    "way_id": np.int64,
+    "way_class": np.int16,
+    "distance_to_way_m": np.float32,
+    "on_square": np.bool_,
+}
+
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class RouteLattice:
     """Lattice points that are accessible on foot or by car.
+
+    Columns may be given as lists, or as arrays of another type that hold such numbers.
 
     Parameters
     ----------
@@ -51,6 +64,9 @@ class RouteLattice:
 
     def __post_init__(self) -> None:
         faults = Faults()
+        for name, kind in _COLUMNS.items():
+            object.__setattr__(self, name, _column(name, getattr(self, name), kind, faults))
+        faults.raise_if_any(InputError)
         columns = (self.col, self.way_id, self.way_class, self.distance_to_way_m, self.on_square)
         if any(column.shape != self.row.shape for column in columns):
             shapes = ", ".join(str(column.shape) for column in columns)
@@ -87,3 +103,31 @@ class RouteLattice:
         mask = np.zeros((self.lattice.rows, self.lattice.cols), dtype=np.bool_)
         mask[self.row, self.col] = True
         return mask
+
+
+def _column(name: str, given: Any, kind: type[np.generic], faults: Faults) -> NDArray[Any]:
+    """Return a column as an array of its type, the same where it is one."""
+    where, found = f"route lattice, {name}", np.asarray(given)
+    if found.ndim != 1:
+        faults.add(where, "one dimension", found.shape)
+    elif found.dtype == kind:
+        return found
+    elif not issubclass(kind, np.integer):
+        if found.dtype.kind in "biuf":
+            return found.astype(kind)
+        faults.add(where, "numbers", _kind_of(found))
+    elif found.dtype.kind not in "iuf":
+        faults.add(where, "whole numbers", _kind_of(found))
+    else:
+        broken = ~np.isfinite(found) | (found != np.floor(found))
+        limits = np.iinfo(kind)
+        beyond = (found < limits.min) | (found > limits.max)
+        if not broken.any() and not beyond.any():
+            return found.astype(kind)
+        expected = "whole numbers" if broken.any() else f"whole numbers of {kind.__name__}"
+        faults.add(where, expected, found[broken if broken.any() else beyond][0])
+    return np.empty(0, kind)
+
+
+def _kind_of(values: NDArray[Any]) -> str:
+    return "text" if values.dtype.kind in "US" else str(values.dtype)

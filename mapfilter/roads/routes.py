@@ -30,6 +30,7 @@ from mapfilter.roads.vector import Layer
 from mapfilter.roads.ways import Bounds, Buildings, Squares, Water, Ways, clip_ways
 
 _LANDUSE = Annotated[tuple[Path, Path] | None, Words("two paths: of a raster and of its table")]
+ROADS_EXPECTED = "the path or name of a map, a GeoDataFrame, or ways"
 _CUT_OUT = "a layer, or true or false"
 
 
@@ -94,7 +95,7 @@ def read_routes(
     """
     check_arguments(
         "read_routes",
-        Argument("roads", roads, Layer | PATH | Ways | None, "a map's path or name, or ways"),
+        Argument("roads", roads, Layer | PATH | Ways | None, ROADS_EXPECTED),
         Argument("lattice", lattice, Lattice, "a lattice such as rasters.lattice"),
         keywords=[
             Setting("profile", profile, Profile),

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
+from difflib import get_close_matches
 from typing import get_args
 
 import pandas as pd
 
+from mapfilter._arguments import shown
+from mapfilter.errors import ConfigError, fail
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.schema import NEIGHBOUR, TABLES, Kind, Without
 
@@ -35,6 +38,11 @@ def leave_out(log: TrackLog, kinds: Collection[Without]) -> TrackLog:
         ``fixes`` and ``pseudoranges``. Of the reports: ``ta`` (timing advances) and ``neighbours``
         (all cells but the serving one).
 
+    Raises
+    ------
+    ConfigError
+        One of them is no kind, or they are no list.
+
     Examples
     --------
     >>> from mapfilter.tracks.log import make_log
@@ -46,6 +54,7 @@ def leave_out(log: TrackLog, kinds: Collection[Without]) -> TrackLog:
     >>> print(*alone.notes, sep="; ")
     ta: 1 left out; neighbours: 1 left out
     """
+    _check_kinds(kinds)
     wanted, notes = set(kinds), list(log.notes)
     if "gnss" in wanted:
         wanted.discard("fixes")
@@ -68,3 +77,16 @@ def leave_out(log: TrackLog, kinds: Collection[Without]) -> TrackLog:
         if count:
             notes.append(f"{kind}: {count} left out")
     return replace(log, notes=tuple(notes))
+
+
+def _check_kinds(kinds: object) -> None:
+    known = get_args(Without)
+    given = kinds if isinstance(kinds, Collection) and not isinstance(kinds, str) else None
+    for one in [kinds] if given is None else given:
+        if given is not None and one in known:
+            continue
+        expected, near = f"a list, each of {', '.join(known)}", ""
+        if isinstance(one, str):
+            near = next(iter(get_close_matches(one, known, 1)), "")
+        hint = "a text; give a list of it" if one in known else near
+        raise fail(ConfigError, "without", expected, shown(one), hint)

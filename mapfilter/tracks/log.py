@@ -170,11 +170,11 @@ def make_log(
     motion, radio, gnss, truth, pseudoranges, tdoa : pandas.DataFrame, optional
         Tables with the columns of :class:`TrackLog`. Required are only ``time_s``, ``role``
         (radio), ``east_m`` and ``north_m`` (gnss, truth), ``satellite`` (pseudoranges), ``cell``
-        and ``reference`` (tdoa). Instead of metres positions may have ``lat_deg`` and ``lon_deg``,
-        and those of gnss ``accuracy_m``, the radius that holds 68 % as phones state it; rows in
-        which both degrees are missing, or both 0, hold no fix and are left out. Instead of
-        ``time_s`` in seconds there may be timestamps with a time zone, in a column ``time_s`` or
-        ``time``: then the first of all is second 0.
+        and ``reference`` (tdoa). Instead of variances gnss may have ``accuracy_m``, the radius that
+        holds 68 % as phones state it. Instead of metres positions may have ``lat_deg`` and
+        ``lon_deg``; rows in which both degrees are missing, or both 0, hold no fix and are left
+        out. Instead of ``time_s`` in seconds there may be timestamps with a time zone, in a column
+        ``time_s`` or ``time``: then the first of all is second 0.
     almanac : Almanac, optional
         Gives the places of satellites where their rows have none; requires a known start.
     start_utc_s : float

@@ -226,3 +226,26 @@ def test_pixels_may_be_lists():
     east_m, north_m = lattice.east_north([0, 1], [0, 2])
     assert (east_m.tolist(), north_m.tolist()) == ([500002.5, 500012.5], [4500007.5, 4500002.5])
     assert lattice.contains([0, 2], (0, 2)).tolist() == [True, False]
+
+
+@pytest.mark.parametrize("given", [32629, "epsg:32629", pyproj.CRS(CRS)])
+def test_a_crs_in_any_form_is_the_same_text(given):
+    lattice = replace(LATTICE, crs=given)
+    assert (lattice, hash(lattice), str(lattice)) == (LATTICE, hash(LATTICE), str(LATTICE))
+    assert lattice.crs == CRS
+
+
+def test_numbers_of_numpy_become_those_of_python():
+    """As files of the database hold them, which know no others."""
+    lattice = Lattice(
+        CRS, np.float64(531_000), np.float64(4_556_000), np.float64(5), *np.array([40, 50])
+    )
+    assert lattice == LATTICE
+    kinds = [type(getattr(lattice, name)) for name in ("west_m", "resolution_m", "rows", "cols")]
+    assert kinds == [float, float, int, int]
+
+
+@pytest.mark.parametrize("bounds", [(0, 0, 10), "west", None, (0, 0, 10, "north")])
+def test_bounds_that_are_no_four_numbers_are_named(bounds):
+    with pytest.raises(InputError, match=r"lattice: expected west, south, east, north in metres"):
+        Lattice.covering(CRS, bounds, 5.0)

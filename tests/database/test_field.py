@@ -76,3 +76,9 @@ def test_areas_without_points(database):
         database.field((-8.62, 41.13, -8.61, 41.14))
     with pytest.raises(InputError, match="an area within"):
         database.field((west + 20, north - 20, west + 10, north - 30))
+
+
+@pytest.mark.parametrize("bounds", [(1, 2, 3), "west", 5.0, (0, 0, np.nan, 10)])
+def test_bounds_that_are_no_four_numbers(database, bounds):
+    with pytest.raises(InputError, match="area: expected west, south, east, north in metres"):
+        database.field(bounds)

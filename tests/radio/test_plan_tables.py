@@ -1,10 +1,12 @@
 """Cell plans as people write them: degrees and minutes, titles, units, several carriers."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import project
+from mapfilter.radio.cells import CellPlan
 from mapfilter.radio.plan_files import read_cell_plan
 from mapfilter.radio.sexagesimal import sexagesimal_deg
 
@@ -135,3 +137,22 @@ def test_power_and_gain_are_named_where_there_is_no_eirp(tmp_path):
     told = refused(tmp_path, header=HEADER.replace("eirp_dbm", "power_dbm"))
     assert "the power in dBm plus the antenna gain in dBi less losses belongs in it" in told
     assert "belongs in it" not in refused(tmp_path, header=HEADER.replace("eirp_dbm", "other"))
+
+
+@pytest.mark.parametrize(
+    ("cells", "found"),
+    [
+        (
+            pd.DataFrame({"id": ["a"]}),
+            "DataFrame (likely: a table; read_cell_plan reads a CSV of it)",
+        ),
+        (["a"], "'a'"),
+        (None, "None"),
+        ({"a": 1}, "'a'"),
+        (5, "5"),
+    ],
+)
+def test_a_plan_is_made_of_cells(cells, found):
+    with pytest.raises(InputError) as caught:
+        CellPlan("EPSG:32632", cells)
+    assert str(caught.value) == f"cell plan: expected cells, each a Cell, found {found}"

@@ -6,7 +6,7 @@ import resource
 import numpy as np
 import pytest
 
-from mapfilter.errors import OutputError
+from mapfilter.errors import InputError, OutputError
 from mapfilter.lattice import Lattice
 from mapfilter.rasters import geotiff_writer as raster_writer
 from mapfilter.rasters.geotiff_writer import write_rasters
@@ -67,3 +67,42 @@ def test_hundreds_of_bands_can_be_read_again(tmp_path):
     found = open_rasters(path)
     assert found.cell_ids == tuple(ids)
     assert found.read()[269, 3, 7] == np.float32(-72.69)
+
+
+SMALL = Lattice("EPSG:32629", 531_000.0, 4_556_000.0, 5.0, 2, 3)
+
+
+def test_masked_pixels_are_no_data(tmp_path):
+    values = np.ma.masked_less([[-80.0, -120.0, -70.0], [-60.0, -50.0, -130.0]], -100)
+    write_rasters(tmp_path / "x.tif", SMALL, [("A", values)], ["A"])
+    found = open_rasters(tmp_path / "x.tif").read()[0]
+    assert np.isnan(found).tolist() == [[False, True, False], [False, False, True]]
+    assert found[0, 0] == -80
+
+
+def test_levels_by_cell_need_no_list_of_cells(tmp_path):
+    levels = {"B": np.full((2, 3), -80.0), "A": [[-70, -71, -72], [-73, -74, -75]]}
+    write_rasters(tmp_path / "x.tif", SMALL, levels)
+    found = open_rasters(tmp_path / "x.tif")
+    assert found.cell_ids == ("B", "A")
+    assert found.read()[1].tolist() == levels["A"]
+    write_rasters(tmp_path / "y.tif", SMALL, levels, ["A", "B"])
+    assert open_rasters(tmp_path / "y.tif").cell_ids == ("A", "B")
+    assert open_rasters(tmp_path / "y.tif").read(None, ["B", "A"]).tolist() == found.read().tolist()
+
+
+@pytest.mark.parametrize(
+    ("items", "ids", "expected"),
+    [
+        (
+            {"A": np.zeros((2, 3))},
+            ["A", "B"],
+            "levels: expected an array of each cell, found none of B",
+        ),
+        ([("A", np.zeros((2, 3)))], None, "cell_ids: expected the ids of all cells, found none"),
+    ],
+)
+def test_cells_without_levels_and_levels_without_cells_are_named(items, ids, expected, tmp_path):
+    with pytest.raises(InputError, match=expected):
+        write_rasters(tmp_path / "x.tif", SMALL, items, ids)
+    assert list(tmp_path.iterdir()) == []

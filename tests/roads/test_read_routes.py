@@ -14,7 +14,7 @@ from test_route_lattice import same
 from mapfilter.database.build import build, build_roads
 from mapfilter.database.rewrite import routes_of
 from mapfilter.database.sources import LatticeRoutes
-from mapfilter.errors import InputError
+from mapfilter.errors import ConfigError, InputError
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.rasters.geotiff_writer import write_rasters
@@ -138,3 +138,11 @@ def test_land_use_decides_and_roads_name_the_ways(tmp_path):
 def test_what_gives_no_roads_is_refused(roads, message):
     with pytest.raises(InputError, match=message):
         read_routes(roads, TOWN)
+
+
+@pytest.mark.parametrize("roads", [ROADS.geometry, list(ROADS.geometry), {"a": 1}])
+def test_lines_that_are_no_layer_are_told_what_one_is(roads):
+    with pytest.raises(ConfigError) as caught:
+        read_routes(roads, TOWN)
+    (fault,) = caught.value.faults
+    assert fault.expected == "the path or name of a map, a GeoDataFrame, or ways"

@@ -199,3 +199,38 @@ def test_layers_and_points_show_themselves_in_a_line():
     assert repr(ways) == f"Ways(1 in {CRS})"
     routes = route_lattice(ways, squares_of((20, 60, 40, 80)), None, LATTICE)
     assert repr(routes) == f"RouteLattice({len(routes)} points, 3 classes; {LATTICE})"
+
+
+POINTS = ([3, 4], [5, 5], [1, 1], [0, 0], ("a",), [0.0, 2.0], [False, True])
+
+
+def test_columns_may_be_lists_and_arrays_of_any_whole_numbers():
+    made = RouteLattice(LATTICE, *POINTS)
+    assert [made.row.dtype, made.way_id.dtype, made.way_class.dtype] == [
+        np.int32,
+        np.int64,
+        np.int16,
+    ]
+    assert [made.distance_to_way_m.dtype, made.on_square.dtype] == [np.float32, np.bool_]
+    assert made.mask().sum() == 2
+    same = RouteLattice(LATTICE, np.array([3.0, 4.0]), *POINTS[1:])
+    assert (same.row.dtype, same.row.tolist()) == (np.int32, [3, 4])
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "expected"),
+    [
+        (0, [3.5, 4], r"route lattice, row: expected whole numbers, found 3\.5"),
+        (1, [5, np.nan], "route lattice, col: expected whole numbers, found nan"),
+        (2, ["a", "b"], "route lattice, way_id: expected whole numbers, found text"),
+        (2, [1, None], "route lattice, way_id: expected whole numbers, found object"),
+        (3, [0, 70_000], "route lattice, way_class: expected whole numbers of int16, found 70000"),
+        (0, [[3], [4]], r"route lattice, row: expected one dimension, found \(2, 1\)"),
+        (5, ["x", "y"], "route lattice, distance_to_way_m: expected numbers, found text"),
+    ],
+)
+def test_columns_of_something_else_are_named(column, value, expected):
+    columns = list(POINTS)
+    columns[column] = value
+    with pytest.raises(InputError, match=expected):
+        RouteLattice(LATTICE, *columns)

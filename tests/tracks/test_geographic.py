@@ -6,6 +6,7 @@ import pytest
 from pyproj import Transformer
 
 import mapfilter as mf
+from mapfilter.errors import InputError
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.store import read_log
 
@@ -30,6 +31,20 @@ def test_positions_in_degrees_are_those_of_the_crs():
     assert log.gnss["cov_east_north_m2"].iloc[0] == 0
     assert "degrees" not in " ".join(log.notes)
     assert "not used" not in " ".join(log.notes)
+
+
+@pytest.mark.parametrize("degrees", [False, True])
+def test_an_accuracy_counts_beside_metres_too(degrees):
+    given = make_log(CRS, gnss=positions()).gnss[["time_s", "east_m", "north_m"]]
+    if degrees:
+        given = given.assign(lat_deg=LAT, lon_deg=LON)
+    stated = given.assign(accuracy_m=[3.03, np.nan, 0.0])
+    log = make_log(CRS, gnss=stated)
+    by_degrees = make_log(CRS, gnss=positions(accuracy_m=[3.03, np.nan, 0.0]))
+    pd.testing.assert_frame_equal(log.gnss, by_degrees.gnss)
+    assert not any("accuracy_m" in note for note in log.notes)
+    with pytest.raises(InputError, match=r"gnss row 2, accuracy_m: expected metres in 0\.\.100000"):
+        make_log(CRS, gnss=given.assign(accuracy_m=[3.03, -1.0, 0.0]))
 
 
 def test_their_own_index_and_timestamps_are_kept():

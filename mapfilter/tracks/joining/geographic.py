@@ -53,9 +53,9 @@ def in_metres(
     table : str
         "gnss" or "truth"; errors are those of the former alone.
     given : pandas.DataFrame
-        With ``lat_deg`` and ``lon_deg`` (WGS 84) and, if known, ``accuracy_m``, the radius that
-        holds 68 % as phones state it. Without the former, or with places in metres, too, it is
-        returned as it is; variances that are given count, and an accuracy does not then.
+        With ``lat_deg`` and ``lon_deg`` (WGS 84), or places in metres, which go first. Of gnss
+        ``accuracy_m``, if known, is the radius that holds 68 % as phones state it; variances that
+        are given count, and an accuracy does not then.
     where : str
         Name of the table in messages.
     crs : str
@@ -64,20 +64,22 @@ def in_metres(
         Number of each row in messages; 1 to N by default.
     """
     degrees = ("lat_deg", "lon_deg")
-    if not set(degrees) <= set(given.columns) or {"east_m", "north_m"} & set(given.columns):
-        return PlacedTable(given, row_numbers)
+    stated = bool(set(_VARIANCES) & set(given.columns))
+    has_accuracy = table == "gnss" and "accuracy_m" in given.columns and not stated
     numbers = np.arange(1, len(given) + 1) if row_numbers is None else np.asarray(row_numbers)
+    if not set(degrees) <= set(given.columns) or {"east_m", "north_m"} & set(given.columns):
+        if not has_accuracy:
+            return PlacedTable(given, row_numbers)
+        accuracy_m = column_values(_ACCURACY, given, TableFaults(where, numbers, faults))
+        rest = given.drop(columns="accuracy_m")
+        return PlacedTable(_with_variances(rest, accuracy_m), row_numbers)
     given, numbers, notes = _with_fix(given.reset_index(drop=True), where, numbers, faults)
     found, before = TableFaults(where, numbers, faults), len(faults.found)
     lat_deg, lon_deg = (column_values(one, given, found) for one in (_LAT, _LON))
-    accuracy_m = None
-    stated = bool(set(_VARIANCES) & set(given.columns))
-    if table == "gnss" and "accuracy_m" in given.columns and not stated:
-        accuracy_m = column_values(_ACCURACY, given, found)
     places = pd.DataFrame({"lat_deg": lat_deg, "lon_deg": lon_deg})
-    if accuracy_m is not None:
-        places = places.assign(accuracy_m=accuracy_m)
-    rest = given.drop(columns=[*degrees, *(() if accuracy_m is None else ("accuracy_m",))])
+    if has_accuracy:
+        places = places.assign(accuracy_m=column_values(_ACCURACY, given, found))
+    rest = given.drop(columns=[*degrees, *(("accuracy_m",) if has_accuracy else ())])
     if crs is None or len(faults.found) > before:
         return PlacedTable(rest.assign(east_m=0.0, north_m=0.0), numbers, notes)
     places, rounded = with_rounding(places, where)
@@ -90,14 +92,18 @@ def in_metres(
     placed = rest.assign(east_m=east_m[kept], north_m=north_m[kept])
     if table != "gnss" or stated or "accuracy_m" not in places:
         return PlacedTable(placed, numbers, notes)
-    accuracy_m = places["accuracy_m"].to_numpy(dtype=np.float64)
+    return PlacedTable(_with_variances(placed, places["accuracy_m"]), numbers, notes)
+
+
+def _with_variances(rows: pd.DataFrame, accuracy: ArrayLike) -> pd.DataFrame:
+    """Return positions with the variances of radii that hold 68 %."""
+    accuracy_m = np.asarray(accuracy, dtype=np.float64)
     variance_m2 = np.where(accuracy_m > 0, (accuracy_m / RADIUS_68) ** 2, np.nan)
-    placed = placed.assign(
+    return rows.assign(
         var_east_m2=variance_m2,
         var_north_m2=variance_m2,
         cov_east_north_m2=np.where(np.isnan(variance_m2), np.nan, 0.0),
     )
-    return PlacedTable(placed, numbers, notes)
 
 
 def _with_fix(
