@@ -265,6 +265,10 @@ def _same(one: pd.DataFrame, other: pd.DataFrame) -> bool:
     inside = _near(one, other)
     if inside.sum() < max(_FEWEST, _COMMON * min(len(one), len(other))):
         return False
+    # Beside the ends nothing tells where the receiver was.
+    inside &= (at_s >= time_s[0]) & (at_s <= time_s[-1])
+    if not inside.any():
+        return False
     off_m = np.hypot(
         np.interp(at_s, time_s, east_m) - there_m[0], np.interp(at_s, time_s, north_m) - there_m[1]
     )[inside]
