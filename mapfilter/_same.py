@@ -23,6 +23,29 @@ class EqualByContent:
         return same(self, other)
 
 
+class EqualByValue:
+    """Base of frozen values: equal where all fields are; NaN equals NaN, and has one hash.
+
+    Dataclasses compare field by field from Python 3.13 on, so that NaN differs from itself there.
+    """
+
+    __slots__ = ()
+
+    def __eq__(self, other: object) -> bool:
+        return same(self, other)
+
+    def __hash__(self) -> int:
+        own: Any = self
+        return hash((type(self), *(_hashable(getattr(own, one.name)) for one in fields(own))))
+
+
+def _hashable(value: Any) -> Any:
+    """Return a value, of which the hash of NaN would be another each time."""
+    if isinstance(value, tuple):
+        return tuple(map(_hashable, value))
+    return value if value == value else None
+
+
 def same(a: Any, b: Any) -> bool:
     """Return whether two beliefs, estimates or outputs are equal to the last bit.
 

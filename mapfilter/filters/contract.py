@@ -14,7 +14,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from mapfilter._same import EqualByContent
+from mapfilter._same import EqualByContent, EqualByValue
 from mapfilter._types import Floats
 
 PriorT = TypeVar("PriorT", contravariant=True)
@@ -79,8 +79,8 @@ class Reason(StrEnum):
     REPEATED_FIX = "repeated_fix"
 
 
-@dataclass(frozen=True, slots=True)
-class MotionStep:
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionStep(EqualByValue):
     """Dead reckoning over one interval.
 
     Parameters

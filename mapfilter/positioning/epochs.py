@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass, fields
 from math import isfinite, isnan, nan
 from typing import Any
 
+from mapfilter._same import EqualByValue
 from mapfilter.filters.contract import MotionStep
 from mapfilter.tracks.schema import SERVING
 
 
-@dataclass(frozen=True, slots=True)
-class ReportRow:
+@dataclass(frozen=True, slots=True, eq=False)
+class ReportRow(EqualByValue):
     """One row of a radio report.
 
     Parameters
@@ -47,8 +48,8 @@ FIX_SD_M = 10.0
 """Deviation, east and north, that is assumed of a fix that states none."""
 
 
-@dataclass(frozen=True, slots=True)
-class GnssFix:
+@dataclass(frozen=True, slots=True, eq=False)
+class GnssFix(EqualByValue):
     """A position by GNSS in the CRS of the database.
 
     Parameters
@@ -68,14 +69,11 @@ class GnssFix:
 
         Noise makes two measured positions differ, also at a standstill.
         """
-        if last is None:
-            return False
-        pairs = zip(astuple(self), astuple(last), strict=True)
-        return all(a == b or (isnan(a) and isnan(b)) for a, b in pairs)
+        return self == last
 
 
-@dataclass(frozen=True, slots=True)
-class Pseudorange:
+@dataclass(frozen=True, slots=True, eq=False)
+class Pseudorange(EqualByValue):
     """One satellite received.
 
     Parameters
@@ -94,8 +92,8 @@ class Pseudorange:
     place_m: tuple[float, float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class Difference:
+@dataclass(frozen=True, slots=True, eq=False)
+class Difference(EqualByValue):
     """How much farther away a cell is than another, by times of arrival.
 
     Parameters
@@ -113,8 +111,8 @@ class Difference:
     reference_sigma_m: float = nan
 
 
-@dataclass(frozen=True, slots=True)
-class Epoch:
+@dataclass(frozen=True, slots=True, eq=False)
+class Epoch(EqualByValue):
     """Motion and measurements of one moment; filters move first, then measure.
 
     Parameters
