@@ -65,6 +65,8 @@ class Pace:
         Mean interval of rows, and the mean deviation from it.
     rests : bool
         Whether a row has reported that the phone stands.
+    rested_silently : bool
+        Whether rows have ended at a rest, which levels showed, and come again.
     speed_mps, recent_mps : float
         Mean speed while it moves, and that of the last seconds.
     fastest_mps : float
@@ -87,13 +89,16 @@ class Pace:
     last_mps: float = 0.0
     rested_s: float = 0.0
     at_rest_s: float = 0.0
+    rested_silently: bool = False
 
     @property
     def reports_always(self) -> bool:
         """Whether rows come at rest, too, so that missing ones are no rest."""
         if self.rows < _KNOWN_ROWS:
             return False
-        return self.rests or self.irregular_s < _REGULAR * self.interval_s
+        if self.rests or self.rested_silently:
+            return self.rests
+        return self.irregular_s < _REGULAR * self.interval_s
 
     @property
     def is_known(self) -> bool:
@@ -158,6 +163,7 @@ class Pace:
             row_mps,
             rested_s,
             at_rest_s,
+            self.rested_silently,
         )
         return pace, going
 
@@ -170,6 +176,10 @@ class Pace:
         """Return the pace after a way that was shown to be slow, at a speed."""
         slower_mps = self.speed_mps + _LEARNT_SHARE * (strolled_mps - self.speed_mps)
         return replace(self, speed_mps=slower_mps)
+
+    def silent(self) -> Pace:
+        """Return the pace of rows that do not come at rest, unless one has reported a rest."""
+        return replace(self, rested_silently=True)
 
     def _usual_s(self, since_s: float) -> float:
         """Return the time that a row covers: after a rest without rows only the usual interval."""

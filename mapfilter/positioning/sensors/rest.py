@@ -61,6 +61,9 @@ _CORNER_RAD, _CORNER_S = radians(45.0), 10.0
 """Turn within some seconds that no bias of a gyroscope adds up to."""
 _SHOWN_NATS, _SHOWN_AGAIN_NATS = -1.0, -5.0
 """Sum at or below which levels show a rest, and do so again after a doubt."""
+_CERTAIN_NATS = -10.5
+"""Sum that a minute of way does not reach (none of 48 simulated ones), and 70 s of rest do (47 of
+52)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,6 +211,11 @@ class Rest:
     def missed_mps(self, gone_s: float) -> float:
         """Return the pace before less what was measured, over a time since it began."""
         return max(self.pace_mps - self.measured_m / gone_s, 0.0) if gone_s > 0 else 0.0
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether levels show it as clearly as those of a minute at rest do."""
+        return not self.is_carried and self.left_nats <= _CERTAIN_NATS
 
     @property
     def is_carried(self) -> bool:

@@ -21,7 +21,7 @@ from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.sensors import unheard
 from mapfilter.positioning.sensors.impossible_steps import without_impossible
-from mapfilter.positioning.sensors.pace import Going, Pace
+from mapfilter.positioning.sensors.pace import WALKERS_MPS, Going, Pace
 from mapfilter.positioning.sensors.pauses import longest_s, unrecorded_s
 from mapfilter.positioning.sensors.places import Carried, Places
 from mapfilter.positioning.sensors.repeats import without_repeats
@@ -87,6 +87,8 @@ def _followed(
     time_s, steps = epoch.time_s, epoch.motion
     known, times, before_m = watch.pace, watch.times, watch.moved_m
     pace, going = known.read(time_s, steps, step_unit_m)
+    if going.moves and _has_rested_silently(watch, time_s, step_unit_m):
+        pace = pace.silent()
     watch = watch._replace(
         pace=pace,
         moved_m=before_m + going.gone_m,
@@ -163,6 +165,13 @@ def _why_unmeasured(watch: SensorWatch, rest: Rest, epoch: Epoch, going: Going) 
 def _are_missing(pace: Pace, time_s: float) -> bool:
     """Return whether motion rows that come all the time have ended."""
     return pace.reports_always and time_s - pace.motion_s > longest_s(pace)
+
+
+def _has_rested_silently(watch: SensorWatch, time_s: float, step_unit_m: float) -> bool:
+    """Return whether a walker's rows, taken for missing, had ended at a rest that levels show."""
+    if watch.rest is None or not watch.rest.is_certain or not _are_missing(watch.pace, time_s):
+        return False
+    return step_unit_m * watch.pace.speed_mps <= WALKERS_MPS
 
 
 def _at_rest(
