@@ -8,6 +8,7 @@ import numpy as np
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
+from mapfilter.models.way_map import MapWeights
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning
 from mapfilter.positioning.bayes.rivals.alternative import (
     AlternativeHypothesis,
@@ -91,7 +92,7 @@ class Beliefs:
 
     @property
     def model(self):
-        return SimpleNamespace(area=self.area)
+        return SimpleNamespace(area=self.area, weights=MapWeights())
 
     @property
     def alone(self):

@@ -9,7 +9,8 @@ from scipy.stats import multivariate_normal
 
 from mapfilter.filters.contract import MotionStep
 from mapfilter.positioning.epochs import Epoch, ReportRow
-from mapfilter.positioning.sensors.rest import Rest, _added, _carried, _left, levels_of
+from mapfilter.positioning.sensors.reported_levels import levels_of
+from mapfilter.positioning.sensors.rest import Rest, _added, _carried, _left
 from mapfilter.positioning.sensors.watch import SensorWatch
 from mapfilter.positioning.sensors.watching import watched
 
@@ -22,6 +23,15 @@ def test_levels_by_their_cells_or_carriers():
     rows = (row("A", -70.0), row(None, -80.0, arfcn=12, bsic=3), row("B", nan),
             row("C", -99.0, censored=-1), row(None, -81.0, arfcn=12))  # fmt: skip
     assert levels_of(rows) == [("A", -70.0), ("12/3", -80.0), ("12/None", -81.0)]
+
+
+def test_a_cell_that_serves_is_compared_with_itself_as_a_neighbour():
+    """A report names the cell that serves; neighbours have a carrier and a code alone."""
+    serves, beside = {"cell": "A", "role": "serving"}, {"cell": None, "role": "neighbour"}
+    code = {"arfcn": 12, "bsic": 3}
+    named, coded = (levels_of((row(level_dbm=-70.0, **own, **code),)) for own in (serves, beside))
+    assert named == coded == [("12/3", -70.0)]
+    assert levels_of((row("A", -70.0, arfcn=12),)) == [("A", -70.0)]
 
 
 @pytest.mark.parametrize("measured_m", [0.0, 6.0])
@@ -255,6 +265,36 @@ def test_a_vehicle_that_takes_a_corner_does_not_stand():
 def test_turns_that_are_no_corner(pace_mps, braked_mps2, turns_rad, heading_rad):
     rest = Rest(0.0, pace_mps=pace_mps, braked_mps2=braked_mps2)
     assert not turning(rest, turns_rad, heading_rad=heading_rad).is_carried
+
+
+def towed(rest, turns_rad, levels_dbm):
+    """The rest after seconds of a turn each, and reports of four cells."""
+    for k, (turn_rad, level_dbm) in enumerate(zip(turns_rad, levels_dbm, strict=True)):
+        apart = (level_dbm, -80.0, -90.0 - level_dbm / 4, -85.0)
+        rows = tuple(row(cell, dbm) for cell, dbm in zip("ABCD", apart, strict=True))
+        rest = rest.heard(float(k), rows).turned(float(k), (MotionStep(0.0, nan, turn_rad),))
+    return rest
+
+
+def test_turns_after_a_usual_stop_count_beside_levels():
+    """A tow: two corners, and levels that change from the third block on."""
+    car, turns = Rest(0.0, pace_mps=9.0, braked_mps2=1.3), ([0.0] * 15 + [0.25] * 6) * 2
+    stood, changed = [-70.0] * 42, [-70.0] * 20 + [-88.0] * 22
+    assert not towed(car, [0.0] * 42, changed).is_carried
+    assert not towed(car, turns, stood).is_carried
+    assert towed(car, turns, changed).is_carried
+    # Half a degree a second is the bias of a gyroscope; a walker turns at rest.
+    assert not towed(car, [np.radians(0.5)] * 42, changed).is_carried
+    assert not towed(replace(car, pace_mps=1.4), turns, changed).is_carried
+
+
+def test_turns_alone_never_outweigh_a_usual_stop():
+    """Each turn of 45 degrees adds 2, to 5 at most; levels that say more stay as they are."""
+    car = Rest(0.0, pace_mps=9.0, braked_mps2=5.0)
+    sums = [turning(car, [0.8] * k).carried_nats for k in range(5)]
+    assert sums == [0.0, 2.0, 4.0, 5.0, 5.0]
+    assert turning(replace(car, carried_nats=5.5), [0.8]).carried_nats == 5.5
+    assert turning(car, [0.8, 0.1]).turned_rad == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,7 @@ from mapfilter.positioning.bayes.rivals.transitions import (
     resolve_alternative,
 )
 from mapfilter.positioning.bayes.rivals.unaided import beside_alternative
+from mapfilter.positioning.bayes.rivals.yards import off_nats_per_m
 from mapfilter.positioning.bayes.sources.evidence import (
     Context,
     EvidenceSource,
@@ -130,7 +131,8 @@ class Weighing:
             return state.begun_anew(), info.reason
         if info.reason is not Reason.USED:
             return replace(state, belief=belief), info.reason
-        null = challenged(rules, state.null, reading, before, belief)
+        off_nats = off_nats_per_m(beliefs, state)
+        null = challenged(rules, state.null, reading, before, belief, off_nats)
         alternative = state.alternative
         if alternative is not None:
             terms = weighed_by(alternative.belief, updates, measured=measured, alternative=True)

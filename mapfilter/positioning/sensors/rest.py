@@ -11,7 +11,8 @@ the distance.
 
 A vehicle does not turn where it stands: an odometer whose zeros began at once, beyond usual
 braking, and have the turn of a corner, is dead. Wheel sensors also read zero while one creeps into
-a parking lot.
+a parking lot. So after a usual stop, as of a car that is towed or stands on a ferry, turns are
+added to what levels say, and do not suffice alone.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from math import exp, inf, isfinite, log, nan, radians, sqrt
 from mapfilter.filters.contract import MotionStep
 from mapfilter.positioning.epochs import ReportRow
 from mapfilter.positioning.sensors.pace import WALKERS_MPS
+from mapfilter.positioning.sensors.reported_levels import levels_of
 from mapfilter.tracks.schema import SERVING
 
 _BLOCK_S = 10.0
@@ -59,6 +61,9 @@ _BRAKES_MPS2 = 5.0
 """Beyond usual braking."""
 _CORNER_RAD, _CORNER_S = radians(45.0), 10.0
 """Turn within some seconds that no bias of a gyroscope adds up to."""
+_NATS_PER_CORNER, _MOST_BY_CORNERS = 2.0, 5.0
+"""What such a turn adds where one may have rolled out, and the largest sum that turns alone make:
+wheels that read zero may creep into a parking lot, or a phone is taken in the hand."""
 _SHOWN_NATS, _SHOWN_AGAIN_NATS = -1.0, -5.0
 """Sum at or below which levels show a rest, and do so again after a doubt."""
 _CERTAIN_NATS = -10.5
@@ -83,7 +88,7 @@ class Rest:
     heard_s : float
         Time of the last report.
     carried_nats : float
-        How much the levels speak for being carried on.
+        How much the levels, and turns of a vehicle, speak for being carried on.
     pace_mps : float
         Speed before the rest.
     began_s : float
@@ -127,15 +132,19 @@ class Rest:
 
         Headings beside turns may be courses of a receiver, which turn at rest.
         """
-        is_driven = self.braked_mps2 > _BRAKES_MPS2 and self.pace_mps > WALKERS_MPS
-        if not is_driven or self.is_carried:
+        if self.pace_mps <= WALKERS_MPS or self.is_carried:
             return self
         turns = [s.turn_rad for s in steps if isfinite(s.turn_rad) and not isfinite(s.heading_rad)]
         if not turns:
             return self
         kept = exp((self.turned_s - time_s) / _CORNER_S)
         turned_rad = kept * self.turned_rad + sum(turns)
-        nats = _CARRIED_NATS if abs(turned_rad) >= _CORNER_RAD else self.carried_nats
+        nats = self.carried_nats
+        if abs(turned_rad) >= _CORNER_RAD:
+            most_nats = max(nats, _MOST_BY_CORNERS)
+            rolls_out = self.braked_mps2 <= _BRAKES_MPS2
+            nats = min(nats + _NATS_PER_CORNER, most_nats) if rolls_out else _CARRIED_NATS
+            turned_rad = 0.0
         return replace(self, turned_rad=turned_rad, turned_s=time_s, carried_nats=nats)
 
     def heard(self, time_s: float, rows: tuple[ReportRow, ...], gone_m: float = 0.0) -> Rest:
@@ -234,15 +243,6 @@ class Rest:
     def left_probability(self) -> float:
         """Probability that the phone was carried on at the pace before, by its levels alone."""
         return 1 / (1 + exp(-self.left_nats))
-
-
-def levels_of(rows: tuple[ReportRow, ...]) -> list[tuple[str, float]]:
-    """Return the levels of a report by their cells."""
-    return [
-        (row.cell if row.cell is not None else f"{row.arfcn}/{row.bsic}", row.level_dbm)
-        for row in rows
-        if isfinite(row.level_dbm) and row.censored == 0
-    ]
 
 
 def _carried(

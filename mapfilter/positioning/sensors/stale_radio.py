@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import isfinite
 
 from mapfilter.positioning.epochs import ReportRow
-from mapfilter.positioning.sensors.rest import levels_of
+from mapfilter.positioning.sensors.reported_levels import levels_of
 
 _NATS_PER_M, _MOST_ROWS = 0.12, 3
 """Gain, for each level of at most three, from a report that repeats the last one: by the metres

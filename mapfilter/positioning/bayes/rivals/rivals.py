@@ -196,12 +196,21 @@ def challenged(
     reading: RadioReading,
     before: MapBelief,
     after: MapBelief,
+    off_nats_per_m: float = 0.0,
 ) -> NullHypothesis:
-    """Return the null hypothesis beside a belief after a reading."""
+    """Return the null hypothesis beside a belief after a reading.
+
+    A metre costs it what the map has cost the belief, up to ``off_nats_per_m``, or what it costs by
+    the rules where that is more.
+    """
     other = 0.0
     if reading.levels is not None and after.shared is not None:
         other = after.shared.other_log_likelihood
     gained = after.log_evidence - before.log_evidence
     searching = before.status is Status.SEARCHING
     least = rules.least_log_odds(searching=searching)
-    return null.after(reading, other, gained, after.travelled_m, rules.map_nats_per_m, least)
+    nats_per_m, way_m = rules.map_nats_per_m, after.travelled_m - null.travelled_m
+    if off_nats_per_m > nats_per_m and way_m > 0 and isinstance(before, ParticleBelief):
+        by_map = -float(np.logaddexp.reduce(before.log_weight))
+        nats_per_m = max(nats_per_m, min(by_map / way_m, off_nats_per_m))
+    return null.after(reading, other, gained, after.travelled_m, nats_per_m, least)
