@@ -148,3 +148,13 @@ def test_epochs_are_in_the_crs_of_the_filter_that_takes_them():
     np.testing.assert_allclose([fix.north_m for fix in found], places["north_m"], atol=1e-6)
     own = next(epoch.fix for epoch in mf.epochs(log) if epoch.fix is not None)
     assert own.east_m == log.gnss["east_m"].iloc[0]
+
+
+def test_a_truth_that_was_projected_by_hand_is_taken_as_it_is(database, usual):
+    """It keeps the attributes of the table that it was made of."""
+    log = stated_in("EPSG:23029")
+    track = mf.locate(log, database, "candidate")
+    east_m, north_m = project(CRS, *unproject(log.crs, log.truth["east_m"], log.truth["north_m"]))
+    by_hand = log.truth.assign(east_m=east_m, north_m=north_m)
+    assert by_hand.attrs
+    assert mf.score(track, by_hand).error_mean_m == pytest.approx(usual.error_mean_m, abs=0.5)

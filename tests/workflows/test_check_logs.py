@@ -1,6 +1,7 @@
 """``check`` looks at the log or recordings that a configuration names, and at a survey's times."""
 
 import math
+import re
 
 import numpy as np
 import pandas as pd
@@ -155,7 +156,10 @@ def test_logs_of_another_place_or_system(check, log):
     change(log / "truth.csv", east_m=lambda e: e + 50_000)
     assert "All positions (truth) lie 50 km or more outside." in str(check(log))
     (log / "log.json").write_text('{"crs": "EPSG:32634"}')
-    assert "The log is in EPSG:32634" in check(log)["crs-mixed"]["evidence"]
+    found = check(log)["log-outside-area"]["evidence"]
+    assert re.fullmatch(r"All positions \(truth\) lie 3\d\d km or more outside\.", found)
+    (log / "log.json").write_text('{"crs": "+proj=tmerc +lat_0=0 +lon_0=0 +type=crs"}')
+    assert check(log)["crs-mixed"]["evidence"].startswith("The log is in a local frame: convert it")
 
 
 def test_damaged_and_missing_logs(check, log, tmp_path):

@@ -6,7 +6,16 @@ import shutil
 import numpy as np
 import pandas as pd
 import pytest
-from command_line import ONE, assert_done, assert_refused, change, contents, mapfilter, put
+from command_line import (
+    ONE,
+    assert_done,
+    assert_refused,
+    change,
+    contents,
+    mapfilter,
+    put,
+    settings,
+)
 
 from mapfilter.geodesy import project, unproject
 
@@ -121,7 +130,7 @@ def test_a_crs_with_the_metres_of_the_database(log, replay):
     assert assert_done(replay(log, "--json")).json["switched"] is True
 
 
-def test_a_log_of_the_area_in_another_crs(log, replay):
+def test_a_log_of_the_area_in_another_crs(log, replay, world, tmp_path):
     truth = pd.read_csv(log / "truth.csv")
     degrees = unproject("EPSG:32635", truth["east_m"], truth["north_m"])
     truth["east_m"], truth["north_m"] = project("EPSG:2393", *degrees)
@@ -131,6 +140,11 @@ def test_a_log_of_the_area_in_another_crs(log, replay):
     found = assert_done(replay(log, "--json")).json
     assert any(note.startswith("projected from EPSG:2393 to ") for note in found["notes"])
     assert found["error_mean_m"] == pytest.approx(same["error_mean_m"], abs=2.0)
+    given = ("--db", world.database, "--log", log, "--method", "centroid", "--json")
+    single = assert_done(mapfilter("locate", *given, "--out", tmp_path / "single")).json
+    assert single["error_median_m"] < 500
+    findings = mapfilter("check", "-c", world.toml, *settings(track__path=str(log)), "--json").json
+    assert not [one for one in findings["findings"] if one["code"].startswith(("crs", "log-out"))]
 
 
 def test_one_bad_log_of_many_stops_all_before_anything_is_written(own_world, replay, tmp_path):

@@ -51,7 +51,7 @@ def read_recordings(
 
 def _zone_note(zone: str, recordings: Sequence[Recording]) -> tuple[str, ...]:
     """Return a note on a zone that no recording needed; none without one."""
-    if not zone or any(one.clock.kind == "local" and one.clock.zone for one in recordings):
+    if not zone or any(one.by_zone for one in recordings):
         return ()
     clocks = listed([f"{one.path.name} {one.clock}" for one in recordings], 3)
     return (f"--zone has no effect: no times are local without a zone ({clocks})",)

@@ -42,7 +42,8 @@ class Reading(Remarks):
     ``last_s`` is the last time of the file's rows, used or not, and ``passed_s`` that of the parts
     read so far, of formats without ``last_s``; ``columns`` are the names in the file of columns
     without a usual name, by field. ``doubled`` is by how much all times so far may be later, as of
-    :func:`mapfilter.tracks.readers.clocks.local_times.doubled_s`, and the note on it. ``kept`` are
+    :func:`mapfilter.tracks.readers.clocks.local_times.doubled_s`, and the note on it; ``by_zone``
+    whether any of them is UTC by the zone that was given. ``kept`` are
     rows that ``ending`` takes when all parts are read.
     """
 
@@ -61,6 +62,7 @@ class Reading(Remarks):
     last_s: float = -inf
     passed_s: float = -inf
     doubled: tuple[float, str] = (0.0, "")
+    by_zone: bool = False
     columns: dict[str, str] = field(default_factory=dict)
     kept: list[pd.DataFrame] = field(default_factory=list)
     ending: Callable[[pd.DataFrame], None] | None = None
@@ -275,4 +277,5 @@ class Reading(Remarks):
             self.fields,
             self.unread,
             self.named,
+            self.by_zone or (self.clock.kind == "local" and bool(self.clock.zone)),
         )

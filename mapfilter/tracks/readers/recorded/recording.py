@@ -75,6 +75,8 @@ class Recording:
         that its name resembles.
     named : tuple of str
         Of a plain CSV: the fields of a column map whose columns it has.
+    by_zone : bool
+        Whether local times were turned into UTC by a zone that was given.
     """
 
     path: Path
@@ -90,6 +92,7 @@ class Recording:
     fields: tuple[str, ...] = ()
     unread: tuple[str, ...] = ()
     named: tuple[str, ...] = ()
+    by_zone: bool = False
 
     @property
     def losses(self) -> tuple[str, ...]:

@@ -109,10 +109,13 @@ class Columns:
     ) -> tuple[Floats, bool]:
         """Return UTC seconds of a column of times, see :func:`parse_times`; note odd local ones."""
         time_s, zoned = self._times(names, zone, layout, after_s)
-        if zone and is_beside_change(time_s, zone):
+        changes = bool(zone) and is_beside_change(time_s, zone)
+        if changes or (zone and not self.reading.by_zone):
             one_s, other_s = (self._times(names, z, layout, nan)[0] for z in ("+00:00", "+01:00"))
-            local_s = np.where(one_s == other_s, np.nan, one_s)
-            note_changes(self.reading, local_s, time_s, zone, after_s)
+            self.reading.by_zone |= not np.array_equal(one_s, other_s, equal_nan=True)
+            if changes:
+                local_s = np.where(one_s == other_s, np.nan, one_s)
+                note_changes(self.reading, local_s, time_s, zone, after_s)
         return time_s, zoned
 
     def _times(
