@@ -27,7 +27,7 @@ class Validation:
         What was left out: "logs", or "squares of N m"; or how reports were drawn.
     folds, reports : int
         Times that something was left out, and reports located.
-    mean_m, median_m, error_95_m : float
+    error_mean_m, error_median_m, error_95_m : float
     within_50, within_67, within_95 : float
         Shares of the reports within the radii, each calibrated without its own block.
     """
@@ -36,8 +36,8 @@ class Validation:
     blocks: str
     folds: int
     reports: int
-    mean_m: float
-    median_m: float
+    error_mean_m: float
+    error_median_m: float
     error_95_m: float
     within_50: float
     within_67: float
