@@ -53,8 +53,6 @@ class Truth(EqualByContent):
         for name in _COLUMNS:
             object.__setattr__(self, name, _numbers(name, getattr(self, name), faults))
         faults.raise_if_any(InputError)
-        if not self.time_s.size:
-            faults.add(f"{_WHERE}, time_s", "one position or more", "none")
         for name in _COLUMNS[1:]:
             shape = getattr(self, name).shape
             if shape != self.time_s.shape:

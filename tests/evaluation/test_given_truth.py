@@ -30,7 +30,6 @@ def test_lists_and_whole_numbers_will_do():
         ),
         (([0.0, 1.0], ["a", "b"], [0, 1]), "east_m: expected numbers, found list"),
         ((None, [0, 1], [0, 1]), "time_s: expected numbers, found None"),
-        (([], [], []), "time_s: expected one position or more, found none"),
     ],
 )
 def test_what_is_no_way_through_time_is_refused(columns, expected):
