@@ -23,6 +23,8 @@ from mapfilter._kernel_cache import keep_kernels
 if TYPE_CHECKING:
     from mapfilter.api.bounds import Bound as Bound
     from mapfilter.api.bounds import bound as bound
+    from mapfilter.api.estimates import read_estimate as read_estimate
+    from mapfilter.api.estimates import write_estimate as write_estimate
     from mapfilter.api.journeys import simulate as simulate
     from mapfilter.api.located import Track as Track
     from mapfilter.api.located import locate as locate
@@ -70,6 +72,7 @@ if TYPE_CHECKING:
 
 _NAMES = {
     "api.bounds": "Bound bound",
+    "api.estimates": "read_estimate write_estimate",
     "api.journeys": "simulate",
     "api.located": "Track locate",
     "api.logs": "make_log read_log",

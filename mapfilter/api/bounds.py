@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,8 +18,10 @@ from mapfilter.evaluation.first_fix import FirstFixOptions
 from mapfilter.evaluation.map_bound import MapBound, on_lattice
 from mapfilter.evaluation.map_bound import bound as bound_of
 from mapfilter.evaluation.radio_map import ErrorModel
+from mapfilter.positioning.place_tables import with_points
 
 if TYPE_CHECKING:
+    import geopandas as gpd
     from matplotlib.axes import Axes
 
 
@@ -40,9 +43,17 @@ class Bound:
         median_m = float(np.nanmedian(along_m))
         return f"Bound: {along_m.size} points, {median_m:.1f} m along the street (median)"
 
+    def _repr_html_(self) -> str:
+        """Return the summary and the last points, as notebooks show them."""
+        return f"<p>{escape(repr(self))}</p>{self.to_dataframe().tail().to_html()}"
+
     def to_dataframe(self) -> pd.DataFrame:
         """Return the figures of each point; see also ``found.by_way()`` and ``found.twins()``."""
         return self.found.to_dataframe()
+
+    def to_geodataframe(self) -> gpd.GeoDataFrame:
+        """Return the same with points in the CRS of the database."""
+        return with_points(self.to_dataframe(), self.database.lattice.crs)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the least position error along the street at each point.

@@ -24,7 +24,7 @@ from mapfilter.tracks.log import TrackLog
 @python_words()
 def simulate(
     rasters: RxLevRasters,
-    cells: CellPlan,
+    plan: CellPlan,
     roads: Layer | Ways,
     *,
     journeys: int = 1,
@@ -43,8 +43,8 @@ def simulate(
     rasters : RxLevRasters
         The levels that the phone receives. Other rasters than those of the database, or
         the database has no errors.
-    cells : CellPlan
-        Their sites and carriers, as :func:`mapfilter.read_cell_plan` reads them.
+    plan : CellPlan
+        Their cells: sites and carriers, as :func:`mapfilter.read_cell_plan` reads them.
     roads : path, GeoDataFrame or Ways
         OpenStreetMap file or vector layer, as for :func:`mapfilter.read_routes`.
     journeys : int
@@ -79,7 +79,7 @@ def simulate(
     check_arguments(
         "simulate",
         rasters_argument(rasters),
-        Argument("cells", cells, CellPlan, "a cell plan of read_cell_plan"),
+        Argument("plan", plan, CellPlan, "a cell plan of read_cell_plan"),
         roads_argument(roads),
         keywords=[
             Setting("journeys", journeys, Count),
@@ -100,8 +100,8 @@ def simulate(
         imu=imu or ImuNoise(),
         reports=reports or ReportModel(),
     )
-    network, rasters = network_of(roads, rasters, profile), named_by_plan(rasters, cells)
-    return dict(simulate_journeys(network, rasters, cells, settings, seed))
+    network, rasters = network_of(roads, rasters, profile), named_by_plan(rasters, plan)
+    return dict(simulate_journeys(network, rasters, plan, settings, seed))
 
 
 def reports_argument(value: object) -> Argument:

@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 
 from mapfilter._arguments import Argument, check_arguments
+from mapfilter._same import EqualByContent
 from mapfilter.api.located import Track
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.evaluation.accuracy import (
@@ -36,7 +37,7 @@ _NO_FIGURES = ("error_m", "notes")
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Score(Accuracy):
+class Score(EqualByContent, Accuracy):
     """Accuracy of one track against ground truth.
 
     Besides the figures of :class:`mapfilter.evaluation.accuracy.Accuracy`, how often the radius

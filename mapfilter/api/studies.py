@@ -49,6 +49,7 @@ from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.options import Positive
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.custom_filter import GivenFilter
+from mapfilter.positioning.filter import Filter
 from mapfilter.positioning.locators import given_options
 from mapfilter.rasters.names import named_by_plan
 from mapfilter.rasters.raster_set import RxLevRasters
@@ -206,6 +207,8 @@ def _not_a_filter(given: Any, *, here: bool) -> tuple[str, str, str] | None:
         own = type(given)
         made = callable(getattr(given, "locate", getattr(given, "step", None)))
         hint = f"its class, {own.__name__}, which is called with the database" if made else ""
+        if isinstance(given, Filter) and given.made_of is not None:
+            hint = f"its options, {type(given.made_of).__name__}(…)"
         return "options, a class, or the name of a filter", own.__name__, hint
     if here:
         return None

@@ -69,7 +69,8 @@ def held_by_radius_95(estimate: TrackEstimate, truth: Truth) -> Bools:
 
     Examples
     --------
-    >>> held_by_radius_95(TrackEstimate.of_fixes("EPSG:32635", "none", []), Truth(*np.eye(3, 2)))
+    >>> nowhere = TrackEstimate.of_fixes("EPSG:32635", "none", [])
+    >>> held_by_radius_95(nowhere, Truth(*np.zeros((3, 2))))
     array([], dtype=bool)
     """
     switch = estimate.converged_at

@@ -88,7 +88,7 @@ def claimed_radii(estimate: TrackEstimate, truth: Truth) -> ClaimedRadii:
 
     Examples
     --------
-    >>> claimed_radii(TrackEstimate.of_fixes("EPSG:32635", "none", []), Truth(*np.eye(3, 2)))
+    >>> claimed_radii(TrackEstimate.of_fixes("EPSG:32635", "none", []), Truth(*np.zeros((3, 2))))
     ClaimedRadii(epochs=0, claimed_epochs=0, held_95_epochs=None, radius_95_median_m=nan)
     """
     counted = truth.tells(estimate.time_s)

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from scipy.special import gammaincinv
 
 from mapfilter._types import Floats
+from mapfilter.errors import InputError, fail
 from mapfilter.evaluation.success import wilson_interval
 
 
@@ -39,15 +40,31 @@ class Coverage:
 def coverage(errors_m: ArrayLike, radii_m: ArrayLike, share: float) -> Coverage:
     """Count how often errors are within radii; cases without either are left out.
 
+    Parameters
+    ----------
+    errors_m, radii_m : (N,) array_like
+        One of them may be a single number.
+    share : float
+        That the radii should hold, 0 to 1.
+
+    Raises
+    ------
+    InputError
+        The share lies beyond, or there are not as many radii as errors.
+
     Examples
     --------
     >>> found = coverage([1.0, 5.0, 2.0], [2.0, 4.0, 2.0], 0.67)
     >>> found.inside, found.cases, round(found.covered, 2)
     (2, 3, 0.67)
     """
-    errors, radii = np.broadcast_arrays(
-        np.asarray(errors_m, dtype=np.float64), np.asarray(radii_m, dtype=np.float64)
-    )
+    if not 0 <= share <= 1:
+        raise fail(InputError, "coverage, share", "a number in 0..1", share)
+    errors = np.asarray(errors_m, dtype=np.float64)
+    radii = np.asarray(radii_m, dtype=np.float64)
+    if errors.ndim and radii.ndim and errors.shape != radii.shape:
+        raise fail(InputError, "coverage, radii_m", f"shape {errors.shape}", radii.shape)
+    errors, radii = np.broadcast_arrays(errors, radii)
     known = np.isfinite(errors) & np.isfinite(radii)
     cases, inside = int(known.sum()), int(np.sum(errors[known] <= radii[known]))
     low, high = wilson_interval(inside, cases)

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mapfilter._arguments import shown
 from mapfilter._same import EqualByContent
 from mapfilter._types import Bools, Floats, Ints
+from mapfilter.errors import Faults, InputError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,6 +26,7 @@ noise."""
 _APART = 6.0
 """Standard deviations of noise between places, of which one in 8000 is farther from another."""
 _COLUMNS = ("time_s", "east_m", "north_m")
+_WHERE = "ground truth"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,12 +36,33 @@ class Truth(EqualByContent):
     Parameters
     ----------
     time_s, east_m, north_m : (T,) arrays
-        True positions, in ascending time, in the CRS of the estimate.
+        True positions, in ascending time, in the CRS of the estimate; lists will do.
+
+    Raises
+    ------
+    InputError
+        A column is of another length, or no numbers; times step back, or are not finite.
     """
 
     time_s: Floats
     east_m: Floats
     north_m: Floats
+
+    def __post_init__(self) -> None:
+        faults = Faults()
+        for name in _COLUMNS:
+            object.__setattr__(self, name, _numbers(name, getattr(self, name), faults))
+        faults.raise_if_any(InputError)
+        for name in _COLUMNS[1:]:
+            shape = getattr(self, name).shape
+            if shape != self.time_s.shape:
+                faults.add(f"{_WHERE}, {name}", f"{self.time_s.size} positions", f"shape {shape}")
+        if not np.isfinite(self.time_s).all():
+            unknown = self.time_s[~np.isfinite(self.time_s)][0]
+            faults.add(f"{_WHERE}, time_s", "finite seconds", unknown)
+        elif (np.diff(self.time_s) < 0).any():
+            faults.add(f"{_WHERE}, time_s", "seconds in ascending order", "a step back")
+        faults.raise_if_any(InputError)
 
     @classmethod
     def of_table(cls, table: pd.DataFrame) -> Truth | None:
@@ -120,6 +144,21 @@ class Truth(EqualByContent):
             if np.hypot(*(place_m - places_m[kept[-1]])) > apart_m:
                 kept.append(i)
         return np.array(kept)
+
+
+def _numbers(name: str, given: object, faults: Faults) -> Floats:
+    """Return a column as an array of numbers; empty, with a fault, where it is none."""
+    try:
+        found = None if given is None else np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        found = None
+    if found is not None and found.ndim == 1:
+        return found
+    if found is None:
+        faults.add(f"{_WHERE}, {name}", "numbers", shown(given))
+    else:
+        faults.add(f"{_WHERE}, {name}", "one dimension", f"shape {found.shape}")
+    return np.empty(0)
 
 
 def _noise_m(time_s: Floats, places_m: Floats) -> float:

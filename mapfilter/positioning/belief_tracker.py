@@ -128,7 +128,7 @@ class BeliefTracker(Filter[TrackState]):
         belief, status, count = state.belief, state.status, state.hypotheses
         if belief is None:
             unused += [_unused(epoch, "motion", "", Reason.NOT_STARTED) for _ in epoch.motion]
-            by_fix = self.start_by_fix and epoch.fix is not None
+            by_fix = self.start_by_fix and epoch.gnss is not None
             if reason is not Reason.USED and not by_fix:
                 if cell:
                     unused.append(_unused(epoch, SERVING, cell, reason))

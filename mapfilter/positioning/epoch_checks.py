@@ -54,7 +54,7 @@ _FIELDS: dict[type, dict[str, Column]] = {
     Pseudorange: {
         "satellite": _COLUMNS["pseudoranges"]["satellite"],
         # With a receiver's clock that runs away.
-        "range_m": Column("range_m", -1e12, 1e12, "metres"),
+        "pseudorange_m": Column("pseudorange_m", -1e12, 1e12, "metres"),
         "sigma_m": _COLUMNS["pseudoranges"]["sigma_m"],
     },
     Difference: {
@@ -89,8 +89,8 @@ _PLACE = _COLUMNS["pseudoranges"][PLACE[0]]
 _KINDS = {
     "motion": MotionStep,
     "radio": ReportRow,
-    "ranges": Pseudorange,
-    "differences": Difference,
+    "pseudoranges": Pseudorange,
+    "tdoa": Difference,
 }
 
 
@@ -187,13 +187,13 @@ def _is_well(epoch: Any) -> bool:
     """Return whether all values are as expected; most epochs end here."""
     if not (isinstance(epoch, Epoch) and _is_within(epoch.time_s, _TIME.low, _TIME.high)):
         return False
-    parts = (epoch.motion, epoch.radio, epoch.ranges, epoch.differences)
+    parts = (epoch.motion, epoch.radio, epoch.pseudoranges, epoch.tdoa)
     # What can be gone over once only would be empty afterwards.
     if not all(map(_are_rows, parts)):
         return False
     try:
-        rows = (*epoch.motion, *epoch.radio, *epoch.ranges, *epoch.differences)
-        rows = rows if epoch.fix is None else (*rows, epoch.fix)
+        rows = (*epoch.motion, *epoch.radio, *epoch.pseudoranges, *epoch.tdoa)
+        rows = rows if epoch.gnss is None else (*rows, epoch.gnss)
         # Arrays of one number compare as numbers do, but have no hash.
         hash(rows)
         return all(map(_row_is_well, rows))
@@ -257,8 +257,8 @@ def _rows(epoch: Epoch, faults: Faults) -> Iterator[tuple[str, type, Any]]:
             continue
         for number, row in enumerate(rows):
             yield f"epoch, {name}[{number}]", kind, row
-    if epoch.fix is not None:
-        yield "epoch, fix", GnssFix, epoch.fix
+    if epoch.gnss is not None:
+        yield "epoch, gnss", GnssFix, epoch.gnss
 
 
 def _check(where: str, value: object, column: Column, faults: Faults) -> None:

@@ -78,7 +78,7 @@ class Pseudorange(EqualByValue):
 
     Parameters
     ----------
-    range_m : float
+    pseudorange_m : float
         With the receiver's clock in it; NaN where it was not measured.
     sigma_m : float
         NaN where unknown.
@@ -87,7 +87,7 @@ class Pseudorange(EqualByValue):
     """
 
     satellite: str
-    range_m: float
+    pseudorange_m: float
     sigma_m: float
     place_m: tuple[float, float, float]
 
@@ -126,9 +126,9 @@ class Epoch(EqualByValue):
     time_s: float
     motion: tuple[MotionStep, ...] = ()
     radio: tuple[ReportRow, ...] = ()
-    fix: GnssFix | None = None
-    ranges: tuple[Pseudorange, ...] = ()
-    differences: tuple[Difference, ...] = ()
+    gnss: GnssFix | None = None
+    pseudoranges: tuple[Pseudorange, ...] = ()
+    tdoa: tuple[Difference, ...] = ()
 
     @property
     def measured(self) -> bool:

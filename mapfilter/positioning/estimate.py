@@ -13,6 +13,7 @@ from mapfilter._types import Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError
 from mapfilter.filters.contract import Reason, Status
+from mapfilter.positioning.place_tables import with_points
 from mapfilter.positioning.step_output import Fix, UnusedReading
 
 if TYPE_CHECKING:
@@ -191,12 +192,7 @@ class TrackEstimate(EqualByContent):
 
     def to_geodataframe(self) -> gpd.GeoDataFrame:
         """Return the same with points in the CRS; epochs without a position are left out."""
-        import geopandas as gpd
-
-        table = self.to_dataframe()
-        table = table[np.isfinite(table["east_m"])].reset_index(drop=True)
-        points = gpd.points_from_xy(table["east_m"], table["north_m"])
-        return gpd.GeoDataFrame(table, geometry=points, crs=self.crs)
+        return with_points(self.to_dataframe(), self.crs)
 
     @classmethod
     def of_fixes(

@@ -139,8 +139,8 @@ def _motion_step(
     return MotionStep(step_m, heading_rad, turn_rad, sampling_sd_m=known_m)
 
 
-def _pseudorange(name: str, range_m: float, sigma_m: float, *place_m: float) -> Pseudorange:
-    return Pseudorange(name, range_m, sigma_m, (place_m[0], place_m[1], place_m[2]))
+def _pseudorange(name: str, pseudorange_m: float, sigma_m: float, *place_m: float) -> Pseudorange:
+    return Pseudorange(name, pseudorange_m, sigma_m, (place_m[0], place_m[1], place_m[2]))
 
 
 def _last(rows: list[Any]) -> Any:
@@ -162,8 +162,8 @@ class _Field(NamedTuple):
 _FIELDS = {
     "motion": _Field("motion", _motion_step, more=("sampling_sd_m",)),
     "radio": _Field("radio", _report_row),
-    "gnss": _Field("fix", GnssFix, _last),
-    "pseudoranges": _Field("ranges", _pseudorange),
-    "tdoa": _Field("differences", Difference),
+    "gnss": _Field("gnss", GnssFix, _last),
+    "pseudoranges": _Field("pseudoranges", _pseudorange),
+    "tdoa": _Field("tdoa", Difference),
 }
 """The field of each table of :data:`mapfilter.tracks.schema.TABLES` that holds measurements."""

@@ -141,7 +141,7 @@ def check_fixes(epochs: Sequence[Epoch], before: BayesState, lattice: Lattice) -
         the session has no belief, and another usual mistake puts them far away or the request
         reports no cells (400).
     """
-    placed = [(index, one.fix) for index, one in enumerate(epochs) if one.fix is not None]
+    placed = [(index, one.gnss) for index, one in enumerate(epochs) if one.gnss is not None]
     if not placed or before.last_fix is not None:
         return
     east_m = np.array([fix.east_m for _, fix in placed])

@@ -91,7 +91,7 @@ class Watcher:
                 "lead": _known(moment.lead),
                 "mass_50m": _known(moment.mass),
             }
-        measured = bool(epoch.radio) or epoch.fix is not None or bool(epoch.ranges)
+        measured = bool(epoch.radio) or epoch.gnss is not None or bool(epoch.pseudoranges)
         if rng is not None and measured:
             why = explanation_of(self.positioner, before, epoch, rng, output)
             if why is not None:

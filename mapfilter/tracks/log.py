@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from mapfilter._arguments import Argument, Entries, Setting, check_arguments, items
 from mapfilter._html import html_table, shortened
+from mapfilter._same import EqualByContent
 from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail
@@ -55,7 +56,7 @@ _PLACED = ("gnss", "truth")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TrackLog:
+class TrackLog(EqualByContent):
     """The recording of one journey; made by :func:`make_log`, which checks everything.
 
     Parameters

@@ -131,7 +131,7 @@ class TraceRecorder:
             found = self.filter.hypotheses(after)
             if found is not None and found.weight.size:
                 self.frames.add(number, density(number, found), always=changed)
-        measured = bool(epoch.radio) or epoch.fix is not None or bool(epoch.ranges)
+        measured = bool(epoch.radio) or epoch.gnss is not None or bool(epoch.pseudoranges)
         if measured and not rests and (changed or self.explained.due(number)):
             explanation = explanation_of(self.filter, before, epoch, rng, output)
             if explanation is not None:

@@ -172,14 +172,15 @@ def made(trial, seed):
     return dlr.TrackErrors(errors, seen, seen - 3)
 
 
-def test_a_paper_run_and_its_table(monkeypatch):
+@pytest.mark.parametrize("executor", [SerialExecutor(), None])
+def test_a_paper_run_and_its_table(executor, monkeypatch):
     monkeypatch.setattr(dlr, "track_errors", made)
     monkeypatch.setattr(
         dlr, "errors_over_time", lambda draw, trial, seed: np.full((3, 10), draw + trial + seed)
     )
     monkeypatch.setattr(dlr, "DRAWS", 2)
     told = []
-    given = PaperSettings(3, 5, SerialExecutor(), None, lambda *done: told.append(done))
+    given = PaperSettings(3, 5, executor, progress=lambda *done: told.append(done))
     run = dlr.run_paper(given)
     assert told == [(1, 5), (2, 5), (3, 5), (4, 5), (5, 5)]
     assert run.shown == 1

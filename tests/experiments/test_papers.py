@@ -4,6 +4,7 @@ import pytest
 
 from mapfilter.errors import ConfigError
 from mapfilter.experiments.papers import PAPERS, find_paper
+from mapfilter.experiments.papers.paper import PaperSettings
 from mapfilter.workflows.reproduce import run_reproduce
 
 
@@ -30,3 +31,10 @@ def test_what_a_paper_does_not_take_is_refused(name, given, message, tmp_path):
     with pytest.raises(ConfigError, match=message):
         run_reproduce(name, tmp_path / "out", **given)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_paper_on_a_map_says_what_makes_one():
+    with pytest.raises(
+        ConfigError, match=r"sweep: expected .* \(likely: .*run_reproduce makes the map"
+    ):
+        find_paper("khalaf-allah-2007").run(PaperSettings(1))

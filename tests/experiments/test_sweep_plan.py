@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import inf
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -203,3 +204,26 @@ def test_a_plan_is_sent_to_workers_as_it_is():
     assert sent == whole
     assert hash(sent) == hash(whole)
     assert len(pickle.dumps(whole)) < 5000
+
+
+def test_an_axis_of_a_grid_may_be_one_number():
+    assert noise_grid(sigma_orient_deg=3, scale=0.1) == noise_grid(
+        sigma_orient_deg=[3], scale=(0.1,)
+    )
+    assert len(noise_grid(np.array([0.0, 0.2]), np.float64(3.0))) == 2
+
+
+@pytest.mark.parametrize(
+    ("axes", "expected"),
+    [
+        ({"sigma_orient_deg": ()}, "noise_grid, sigma_orient_deg: expected numbers, found none"),
+        ({"scale": "0.1"}, "noise_grid, scale: expected numbers, found '0.1'"),
+        ({"scale": [0.1, None]}, "noise_grid, scale: expected numbers, found None"),
+        ({"others": 3.0}, "noise_grid, others: expected ImuNoise, found 3.0"),
+    ],
+)
+def test_axes_without_numbers_are_named(axes, expected):
+    """A grid without noises would be swept with the usual one."""
+    with pytest.raises(ConfigError) as caught:
+        noise_grid(**axes)
+    assert str(caught.value) == expected

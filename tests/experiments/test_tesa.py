@@ -139,12 +139,13 @@ def test_equal_seeds_give_equal_errors():
     assert (first != other).any()
 
 
-def test_a_paper_run_holds_all_runs(monkeypatch):
+@pytest.mark.parametrize("executor", [SerialExecutor(), None])
+def test_a_paper_run_holds_all_runs(executor, monkeypatch):
     monkeypatch.setattr(
         tesa, "trial_errors_m", lambda trial, seed: np.full((14, 720), trial + seed)
     )
     done = []
-    given = PaperSettings(3, 1, SerialExecutor(), None, lambda *told: done.append(told))
+    given = PaperSettings(3, 1, executor, progress=lambda *told: done.append(told))
     run = tesa.run_paper(given)
     assert len(run.errors_m) == len(tesa.RUNS) == 14
     assert run.errors_m[tesa.RUNS[5]][:, 7].tolist() == [1, 2, 3]

@@ -130,7 +130,7 @@ def test_a_drive_is_reckoned_by_its_turns_where_fixes_end(method):
                 at = way[k] + 5.0 * complex(*rng.normal(0, 1, 2))
                 fix = GnssFix(EAST + at.real, NORTH + at.imag, 25.0, 25.0, 0.0)
             step = MotionStep(5.0 * 1.01, nan, float(measured[k]))
-            state, out = tracker.step(state, Epoch(0.5 * k, (step,), fix=fix), rng)
+            state, out = tracker.step(state, Epoch(0.5 * k, (step,), gnss=fix), rng)
             place = complex(out.fix.east_m - EAST, out.fix.north_m - NORTH)
             off_m.append(abs(place - way[k]))
             radii_m.append(out.fix.radii_m[2])
@@ -158,7 +158,7 @@ def test_what_was_before_a_missing_turn_is_smoothed_without_the_direction_after_
         fix = GnssFix(EAST + at.real, NORTH + at.imag, 25.0, 25.0, 0.0) if k % 4 == 0 else None
         step = MotionStep(5.0, nan, nan if k in missing else float(turns[k]))
         before = state
-        state, out = tracker.step(state, Epoch(0.5 * k, (step,), fix=fix), rng)
+        state, out = tracker.step(state, Epoch(0.5 * k, (step,), gnss=fix), rng)
         smoother.add(before, state)
         off_m.append(abs(complex(out.fix.east_m - EAST, out.fix.north_m - NORTH) - way[k]))
     assert state.reckoning.alignment.known

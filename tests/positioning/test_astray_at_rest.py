@@ -25,7 +25,7 @@ def driven(*, contradicted_s=(), used_s=(), speed_mps=10.0):
     for time_s in range(1, 100):
         fix = GnssFix(5.0 * time_s, 0.1 * (time_s % 7), 25.0, 25.0, 0.0)
         step = MotionStep(speed_mps if time_s <= 30 else 0.0, 0.0)
-        watch, _, (told[time_s], _) = watched(watch, Epoch(float(time_s), (step,), fix=fix))
+        watch, _, (told[time_s], _) = watched(watch, Epoch(float(time_s), (step,), gnss=fix))
         if time_s in contradicted_s:
             watch = watch.contradicted()
         if time_s in used_s:
@@ -49,7 +49,7 @@ def test_they_do_once_one_was_used_or_where_they_contradict_the_rest():
 def test_without_motion_there_is_no_way_to_contradict():
     watch = SensorWatch(has_motion=False)
     assert watch.contradicted() is watch
-    watch, _, _ = watched(watch, Epoch(1.0, fix=GnssFix(0.0, 0.0, 25.0, 25.0, 0.0)))
+    watch, _, _ = watched(watch, Epoch(1.0, gnss=GnssFix(0.0, 0.0, 25.0, 25.0, 0.0)))
     assert watch.contradicted() is watch
 
 

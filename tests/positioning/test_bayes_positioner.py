@@ -181,32 +181,32 @@ def test_reports_close_to_the_last_one_are_not_labelled():
 
 
 def test_a_fix_that_repeats_itself_is_no_new_one():
-    state, output = stepped(at_start(), fix=FIX)
+    state, output = stepped(at_start(), gnss=FIX)
     assert state.last_fix == FIX
     assert told(output) == []
-    again, output = stepped(state, 2.0, fix=FIX)
+    again, output = stepped(state, 2.0, gnss=FIX)
     assert told(output) == [(2.0, "gnss", "", Reason.REPEATED_FIX)]
     assert again.sources["gnss"].compared_at_s == 1.0
     other = replace(FIX, east_m=EAST_M + 0.01)
-    later, output = stepped(again, 3.0, fix=other)
+    later, output = stepped(again, 3.0, gnss=other)
     assert told(output) == []
     # It is compared again only after 10 m or 10 s, so the last one that was used stays.
     assert later.last_fix == FIX
-    later, _ = stepped(again, 13.0, fix=other)
+    later, _ = stepped(again, 13.0, gnss=other)
     assert later.last_fix == other
 
 
 @pytest.mark.parametrize("east_m", [nan, inf])
 def test_a_fix_without_a_position_is_no_fix(east_m):
     for fix in (replace(FIX, east_m=east_m), replace(FIX, north_m=east_m)):
-        state, output = stepped(at_start(), fix=fix)
+        state, output = stepped(at_start(), gnss=fix)
         assert (state.last_fix, told(output)) == (None, [])
         assert state.sources["gnss"].compared_at_s == -inf
-        assert stepped(POSITIONER.begin(), fix=fix)[0].belief is None
+        assert stepped(POSITIONER.begin(), gnss=fix)[0].belief is None
 
 
 def test_a_fix_far_away_is_rejected_and_not_kept():
-    state, output = stepped(at_start(), fix=replace(FIX, east_m=EAST_M + 500.0))
+    state, output = stepped(at_start(), gnss=replace(FIX, east_m=EAST_M + 500.0))
     assert told(output) == [(1.0, "gnss", "", Reason.REJECTED_BY_EVIDENCE)]
     assert state.last_fix is None
 
@@ -225,7 +225,7 @@ def test_scores_need_no_ways_and_levels():
 
 def test_what_is_weighed_at_an_epoch_may_be_asked_for():
     begun = at_start(status=Status.UNCERTAIN)
-    epoch = Epoch(1.0, (STEP,), (row("A"),), fix=FIX)
+    epoch = Epoch(1.0, (STEP,), (row("A"),), gnss=FIX)
     state, updates, measured = POSITIONER.evidence_at(begun, epoch, rng())
     after, _ = POSITIONER.step(begun, epoch, rng())
     assert measured

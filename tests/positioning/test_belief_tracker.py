@@ -103,7 +103,7 @@ def test_it_starts_and_is_updated_with_the_first_known_cell():
 
 @pytest.mark.parametrize(("by_fix", "starts"), [(True, True), (False, False)])
 def test_it_starts_by_a_fix_where_that_is_asked_for(by_fix, starts):
-    given = epoch("X", fix=GnssFix(1.0, 2.0))
+    given = epoch("X", gnss=GnssFix(1.0, 2.0))
     state, _ = tracker(start_by_fix=by_fix).step(TrackState(), given, RNG)
     assert (state.belief is not None) is starts
     usual, _ = tracker().step(TrackState(), given, RNG)

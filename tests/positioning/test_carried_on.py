@@ -110,7 +110,7 @@ def reasons(places_m, *, walk_mps=1.4, every_s=1.0, sd_m=5.0, watch=None, carrie
             # No receiver that measures gives the same position twice.
             fix = GnssFix(places_m(time_s), 0.1 * (time_s % 7), variance_m2, variance_m2, 0.0)
         step = MotionStep(walk_mps if time_s <= 20 else 0.0, 0.0)
-        watch, _, (told[time_s], _) = watched(watch, Epoch(float(time_s), (step,), fix=fix))
+        watch, _, (told[time_s], _) = watched(watch, Epoch(float(time_s), (step,), gnss=fix))
         watch = watch.carried() if time_s == carried_s else watch
     return told
 

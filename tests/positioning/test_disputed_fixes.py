@@ -41,7 +41,7 @@ def followed(fixes, steps=None, *, options=None):
     found = []
     for k, fix in enumerate(fixes):
         step = () if steps is None else (steps[k],)
-        state, out = tracker.step(state, Epoch(float(k), step, fix=fix), rng)
+        state, out = tracker.step(state, Epoch(float(k), step, gnss=fix), rng)
         place = complex(out.fix.east_m - EAST, out.fix.north_m - NORTH)
         reasons = {one.reason for one in out.unused if one.kind == "motion"}
         found.append((place, out.fix.radii_m[2], out.fix.status, reasons))
@@ -313,7 +313,7 @@ def test_an_outlier_is_told():
     state = tracker.begin({"gnss", "motion"})
     for k, step in enumerate(steps):
         place = way[k] + (90.0 if k == 20 else 0.0)
-        state, out = tracker.step(state, Epoch(float(k), (step,), fix=fix_at(place)), rng)
+        state, out = tracker.step(state, Epoch(float(k), (step,), gnss=fix_at(place)), rng)
         told.append((out.fix.reason, [one.reason for one in out.unused if one.kind == "gnss"]))
     rejected = Reason.REJECTED_BY_EVIDENCE
     assert told[20] == (rejected, [rejected])
@@ -412,7 +412,7 @@ def test_a_fix_far_from_a_rest_in_doubt_covers_both_places():
                 for i, level in enumerate(level_db + rng.normal(0, 3, 4) - 80.0)
             )
             fix = fix_at(way[k] + errors(rng, 1)[0]) if k < 100 or k == 250 else None
-            state, out = tracker.step(state, Epoch(float(k), (step,), radio=heard, fix=fix), rng)
+            state, out = tracker.step(state, Epoch(float(k), (step,), radio=heard, gnss=fix), rng)
             off_m = abs(complex(out.fix.east_m - EAST, out.fix.north_m - NORTH) - way[k])
             found.append((off_m, out.fix.radii_m[2], out.fix.status))
         lost += found[249][2] is Status.LOST

@@ -1,6 +1,6 @@
 """A log's tables merged into epochs, row by row, and the headings that turns add up to."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from math import inf, isnan, nan
 
 import numpy as np
@@ -20,6 +20,7 @@ from mapfilter.positioning.epochs import (
 )
 from mapfilter.positioning.merging import epoch_columns, epochs, make_epoch
 from mapfilter.tracks.log import make_log
+from mapfilter.tracks.schema import TABLES as KNOWN
 
 CRS = "EPSG:32632"
 
@@ -72,8 +73,8 @@ def test_rows_of_one_time_are_one_epoch_in_the_order_of_the_file(monkeypatch, at
     (step,) = first.motion
     assert (step.step_m, step.turn_rad) == (1.25, 0.4)
     assert isnan(step.heading_rad)
-    assert first.differences == (Difference("A", "B", 120.0, 30.0, 20.0),)
-    assert (first.radio, first.fix, first.ranges) == ((), None, ())
+    assert first.tdoa == (Difference("A", "B", 120.0, 30.0, 20.0),)
+    assert (first.radio, first.gnss, first.pseudoranges) == ((), None, ())
     assert [one.step_m for one in second.motion] == [1.5, 2.0]
     assert [one.heading_rad for one in second.motion] == pytest.approx([0.1, 0.2])
     assert second.motion[0].turn_rad == 0.3
@@ -82,10 +83,10 @@ def test_rows_of_one_time_are_one_epoch_in_the_order_of_the_file(monkeypatch, at
     assert serving == ReportRow("serving", "A", None, None, -70.0, 0, 3.0)
     same(neighbour, ReportRow("neighbour", None, 61, 5, -110.0, -1, nan))
     # Of several fixes of one time the last counts.
-    same(second.fix, GnssFix(4.1e5, 5.1e6))
-    same(third.ranges[0], Pseudorange("G01", 2.1e7, 3.0, (1e7, 2e7, 3e6)))
-    same(third.ranges[1], Pseudorange("G02", 2.2e7, nan, (2e7, 1e7, 4e6)))
-    assert third.motion == second.differences == ()
+    same(second.gnss, GnssFix(4.1e5, 5.1e6))
+    same(third.pseudoranges[0], Pseudorange("G01", 2.1e7, 3.0, (1e7, 2e7, 3e6)))
+    same(third.pseudoranges[1], Pseudorange("G02", 2.2e7, nan, (2e7, 1e7, 4e6)))
+    assert third.motion == second.tdoa == ()
     same(fourth.radio[0], ReportRow("serving", "A", None, None, nan, 0, nan))
 
 
@@ -139,12 +140,12 @@ def test_an_epoch_of_rows_as_they_arrive():
             "tdoa": [("A", "B", 120.0)],
         },
     )  # fmt: skip
-    assert (found.time_s, found.fix) == (7.0, None)
+    assert (found.time_s, found.gnss) == (7.0, None)
     assert [one.sampling_sd_m for one in found.motion] == [0.0, 0.5, 0.0]
     same(found.radio[0], ReportRow("serving", "A", None, None, nan, 0, nan))
     assert found.radio[1] == ReportRow("neighbour", "B", 61, 5, -90.0, 1, 2.0)
-    assert found.ranges[0].place_m == (1e7, 2e7, 3e6)
-    same(found.differences[0], Difference("A", "B", 120.0, nan, nan))
+    assert found.pseudoranges[0].place_m == (1e7, 2e7, 3e6)
+    same(found.tdoa[0], Difference("A", "B", 120.0, nan, nan))
 
 
 @pytest.mark.parametrize(
@@ -168,10 +169,10 @@ def test_a_fix_repeats_another_to_the_last_digit(last, repeats):
         ({}, False),
         ({"motion": (tested.MotionStep(1.0, 0.0),)}, False),
         ({"radio": (ReportRow("serving", "A", None, None, nan, 0),)}, True),
-        ({"fix": GnssFix(1.0, 2.0)}, True),
-        ({"fix": nan}, False),
-        ({"ranges": (Pseudorange("G01", 1.0, 1.0, (0.0, 0.0, 0.0)),)}, True),
-        ({"differences": (Difference("A", "B", 1.0),)}, True),
+        ({"gnss": GnssFix(1.0, 2.0)}, True),
+        ({"gnss": nan}, False),
+        ({"pseudoranges": (Pseudorange("G01", 1.0, 1.0, (0.0, 0.0, 0.0)),)}, True),
+        ({"tdoa": (Difference("A", "B", 1.0),)}, True),
     ],
 )
 def test_motion_alone_is_no_measurement(given, measured):
@@ -207,3 +208,9 @@ def test_the_first_serving_cell_that_is_named_counts():
     report = tuple(ReportRow(role, cell, None, None, nan, 0) for role, cell in rows)
     assert serving_cell(Epoch(1.0, radio=report)) == "A"
     assert serving_cell(Epoch(1.0, radio=report[:2])) is None
+
+
+def test_fields_of_an_epoch_are_called_as_tables_of_a_log():
+    """As are those of an epoch that a device sends."""
+    named = [one.name for one in fields(Epoch)]
+    assert named == ["time_s", *(name for name, table in KNOWN.items() if table.kinds)]

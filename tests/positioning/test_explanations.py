@@ -141,7 +141,7 @@ def test_a_fix_that_only_the_belief_or_its_alternative_uses(town_filter, tracked
     made_of = before.reckoning.travelled_m, before.belief.log_evidence, epoch.time_s
     beside = AlternativeHypothesis(before.belief, *made_of, sources=others)
     state = replace(before, sources=own, alternative=beside)
-    alone = replace(epoch, radio=(), fix=GnssFix(fix.east_m, fix.north_m, 25.0, 25.0, 0.0))
+    alone = replace(epoch, radio=(), gnss=GnssFix(fix.east_m, fix.north_m, 25.0, 25.0, 0.0))
     after, output = town_filter.step(state, alone, copy.deepcopy(rng))
     found = explained(town_filter, (state, alone, rng, after, output))
     assert [row.what for row in found.rows] == ["streets", "gnss"][:rows]

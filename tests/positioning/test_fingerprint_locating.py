@@ -36,7 +36,7 @@ def test_every_method_beats_the_centroid(floor, method):
 
 def test_auto_takes_the_best_in_cross_validation(floor):
     fitted = fit_locator(floor[0])
-    medians = [one.median_m for one in fitted.validations]
+    medians = [one.error_median_m for one in fitted.validations]
     assert medians == sorted(medians)
     assert len(medians) == 3
     assert fitted.validations[0].within_95 == pytest.approx(0.95, abs=0.03)

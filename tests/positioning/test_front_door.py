@@ -531,3 +531,12 @@ def test_single_reports_are_named_by_the_plan_as_replays_are(tmp_path):
     named = mf.locate_reports(walk, known, "knn").to_dataframe()
     assert len(named) > 50
     pd.testing.assert_frame_equal(found, named)
+
+
+@pytest.mark.parametrize("options", [mf.BayesFilter(), mf.KalmanFilter()])
+def test_a_filter_over_an_area_is_swept_by_its_options(options, database, rasters, streets):
+    """Workers make it of them; its class is not called with the database."""
+    with pytest.raises(mf.MapfilterError) as caught:
+        mf.sweep(database, rasters, streets, {"a": options.over(database)})
+    (fault,) = caught.value.faults
+    assert fault.hint == f"its options, {type(options).__name__}(…)"

@@ -104,7 +104,7 @@ def test_a_path_without_a_database_is_named(world, tmp_path):
         ("log, database", lambda w: mf.locate_reports(w["database"], w["log"])),
         ("track, truth", lambda w: mf.score(w["log"].truth, w["track"])),
         ("rasters, plan, routes, out", lambda w: mf.build(w["plan"], w["rasters"], 0, "db")),
-        ("rasters, cells, roads", lambda w: mf.simulate(w["plan"], w["rasters"], "helsinki")),
+        ("rasters, plan, roads", lambda w: mf.simulate(w["plan"], w["rasters"], "helsinki")),
         (
             "database, rasters, roads, filters",
             lambda w: mf.sweep(w["rasters"], w["database"], "helsinki", {"a": "bayes"}),

@@ -176,7 +176,7 @@ def test_before_the_start_nothing_moves():
     assert made.time_s == 3.0
     heard = (ReportRow("serving", "Z", None, None, -70.0, 0),)
     assert made.take(Epoch(4.0, radio=heard)).reason is Reason.UNKNOWN_CELL
-    assert made.take(Epoch(5.0, fix=GnssFix(nan, 1.0))).reason is Reason.NO_READING
+    assert made.take(Epoch(5.0, gnss=GnssFix(nan, 1.0))).reason is Reason.NO_READING
     assert made.unused[-1].kind == "gnss"
     assert made.belief is None
 
@@ -313,7 +313,7 @@ def test_an_epoch_is_moved_and_then_measured():
     smoother.add(None, made.state)
     np.testing.assert_array_equal(smoother.history.shifts[1], [30.0, 0.0, 0.0, 0.0, 0.0])
     at = GnssFix(EAST + 700.0, NORTH, 4.0, 4.0)
-    fix = made.take(Epoch(2.0, fix=at))
+    fix = made.take(Epoch(2.0, gnss=at))
     assert (fix.status, fix.reason, made.moved_m) == (Status.CONVERGED, Reason.USED, 30.0)
     assert hypot(fix.east_m - EAST - 700.0, fix.north_m - NORTH) < 2.0
     assert fix.mass_50m == pytest.approx(1.0, abs=1e-6)
@@ -371,13 +371,13 @@ def test_a_repeated_fix_is_one_measurement():
     """What a receiver or a program repeats to the last digit makes the belief no narrower."""
     made = walk()
     fix = GnssFix(EAST + 700.0, NORTH, 100.0, 100.0, 0.0)
-    first = made.take(Epoch(0.0, (MotionStep(0.0, 0.0),), fix=fix))
+    first = made.take(Epoch(0.0, (MotionStep(0.0, 0.0),), gnss=fix))
     for _ in range(9):
-        last = made.take(Epoch(0.0, (MotionStep(0.0, 0.0),), fix=fix))
+        last = made.take(Epoch(0.0, (MotionStep(0.0, 0.0),), gnss=fix))
     # A step of no length with a heading spreads it a little.
     assert last.radii_m[2] == pytest.approx(first.radii_m[2], rel=0.01)
     assert [one.reason for one in made.unused if one.kind == "gnss"] == [Reason.REPEATED_FIX] * 9
-    other = made.take(Epoch(0.0, (MotionStep(0.0, 0.0),), fix=replace(fix, north_m=NORTH + 1.0)))
+    other = made.take(Epoch(0.0, (MotionStep(0.0, 0.0),), gnss=replace(fix, north_m=NORTH + 1.0)))
     assert other.radii_m[2] < 0.8 * first.radii_m[2]
 
 
@@ -386,7 +386,7 @@ def test_a_vehicle_that_waits_stays_where_its_receiver_says_without_dead_reckoni
     made = walk(reckoned=False)
     east_m = [*np.arange(0.0, 300.0, 10.0), *300.0 + np.cumsum([8.0, 6.0, 4.0, 2.0]), *[320.0] * 60]
     for time_s, at_m in enumerate(east_m):
-        found = made.take(Epoch(float(time_s), fix=GnssFix(EAST + at_m, NORTH, 9.0, 9.0, 0.0)))
+        found = made.take(Epoch(float(time_s), gnss=GnssFix(EAST + at_m, NORTH, 9.0, 9.0, 0.0)))
     assert abs(found.east_m - EAST - 320.0) < 5.0
     assert not made.unused
 

@@ -49,14 +49,16 @@ def ranges(*late_m, clock_m=2000.0):
 def left_out(*late_m, known=None, clock_m=2000.0, spacing_m=0.0):
     """The satellites that are not used, at the time at which the others were, or as the first."""
     belief, state = (known.belief, known.state) if known else (place(), GnssState())
-    epoch = Epoch(10.0, (), ranges=ranges(*late_m, clock_m=clock_m))
+    epoch = Epoch(10.0, (), pseudoranges=ranges(*late_m, clock_m=clock_m))
     return [name for _, name, _ in GATE.compare(belief, state, epoch, 100.0, spacing_m).unused]
 
 
 @pytest.fixture(scope="module")
 def known():
     """After six satellites without errors, which leave 1.5 m² to the clock."""
-    found = GATE.compare(place(), GnssState(), Epoch(10.0, (), ranges=ranges(*[0.0] * 6)), 100.0, 0)
+    found = GATE.compare(
+        place(), GnssState(), Epoch(10.0, (), pseudoranges=ranges(*[0.0] * 6)), 100.0, 0
+    )
     assert found.state.receiver.covariance[0, 0] == pytest.approx(1.5, rel=1e-3)
     return found
 

@@ -63,7 +63,7 @@ def test_a_fix_that_agrees_weighs_hypotheses_and_leaves_the_belief(gone_m, times
     """Fixes in a row count as one over the distance for which their errors last."""
     belief, fix = belief_at(sd_m=4.0), fix_at(4.0, -3.0)
     state = GnssState(fix_used_at_m=100.0 - gone_m, rejected_since_s=3.0)
-    found = compared(belief, state, fix=fix)
+    found = compared(belief, state, gnss=fix)
     own = FixTerm(widened(fix, times), ORIGIN_M).log_likelihood(belief.state)
     total = np.log(np.exp(belief.log_weight) @ np.exp(own))
     np.testing.assert_allclose(sum_of(found.terms, belief), own - total, atol=1e-6)
@@ -83,7 +83,7 @@ def test_a_fix_that_agrees_weighs_hypotheses_and_leaves_the_belief(gone_m, times
 
 def test_a_repeated_fix_makes_a_wide_belief_as_precise_as_it_is():
     belief, fix = belief_at(count=20_000), fix_at(4.0, -3.0)
-    found = compared(belief, GnssState(fix_used_at_m=99.9), fix=fix)
+    found = compared(belief, GnssState(fix_used_at_m=99.9), gnss=fix)
     weight = np.exp(belief.log_weight + sum_of(found.terms, belief))
     weight /= weight.sum()
     for axis in (EAST, NORTH):
@@ -104,10 +104,10 @@ def test_a_fix_that_no_hypothesis_explains_is_rejected_for_a_while(status, limit
     """Later than usual by the gate; while searching by a wider one."""
     gate = replace(GATE, options=replace(OPTIONS, search_gate=10.0))
     belief = belief_at(sd_m=0.0, status=status)
-    good = compared(belief, fix=off_by(limit - 0.1), gate=gate)
+    good = compared(belief, gnss=off_by(limit - 0.1), gate=gate)
     assert good.unused == ()
     assert not good.state.rejecting
-    bad = compared(belief, fix=off_by(limit + 0.1), gate=gate)
+    bad = compared(belief, gnss=off_by(limit + 0.1), gate=gate)
     assert bad.unused == (("gnss", "", Reason.REJECTED_BY_EVIDENCE),)
     assert bad.compared
     assert bad.under_null == 0.0
@@ -118,13 +118,13 @@ def test_a_fix_that_no_hypothesis_explains_is_rejected_for_a_while(status, limit
     assert not state.was_used(10.0)
     assert state.fix_used_at_m == -inf
     # Nothing is used before its end, whatever it says; a series goes on from its begin.
-    later = compared(belief, state, time_s=14.9, fix=fix_at(), gate=gate)
+    later = compared(belief, state, time_s=14.9, gnss=fix_at(), gate=gate)
     assert later.unused == (("gnss", "", Reason.ON_PROBATION),)
     assert later.compared
     assert later.state.probation_until_s == 15.0
-    again = compared(belief, state, time_s=15.0, fix=off_by(limit + 0.1), gate=gate)
+    again = compared(belief, state, time_s=15.0, gnss=off_by(limit + 0.1), gate=gate)
     assert (again.state.rejected_since_s, again.state.probation_until_s) == (10.0, 20.0)
-    ended = compared(belief, state, time_s=15.0, fix=fix_at(), gate=gate)
+    ended = compared(belief, state, time_s=15.0, gnss=fix_at(), gate=gate)
     assert not ended.state.rejecting
     assert ended.unused == ()
 
@@ -132,7 +132,7 @@ def test_a_fix_that_no_hypothesis_explains_is_rejected_for_a_while(status, limit
 def test_a_rejected_fix_weighs_rivals_that_explain_it():
     """By no more than the gate; those that it contradicts, too, lose nothing."""
     fix = fix_at(100.0, 0.0)
-    found = compared(belief_at(sd_m=0.0), fix=fix)
+    found = compared(belief_at(sd_m=0.0), gnss=fix)
     (term,) = found.rival_terms
     at_fix, near, far = (
         belief_at((PLACE_M[0] + x, PLACE_M[1]), 0.0, count=1).state for x in (100.0, 88.0, -100.0)
@@ -141,14 +141,14 @@ def test_a_rejected_fix_weighs_rivals_that_explain_it():
     assert term.log_likelihood(near) == pytest.approx(7.0)
     assert term.log_likelihood(far) == 0.0
     # One that is used weighs all beliefs alike, one on probation none.
-    assert compared(belief_at(), fix=fix_at()).rival_terms == ()
-    assert compared(belief_at(), found.state, time_s=12.0, fix=fix).rival_terms == ()
+    assert compared(belief_at(), gnss=fix_at()).rival_terms == ()
+    assert compared(belief_at(), found.state, time_s=12.0, gnss=fix).rival_terms == ()
 
 
 def test_a_fix_at_the_gate_is_used():
     """6 m off with a variance of 2 m² it is 9 nats less than at its place."""
     fix = replace(fix_at(6.0), var_east_m2=2.0, var_north_m2=2.0)
-    assert compared(belief_at(sd_m=0.0, count=1), fix=fix).unused == ()
+    assert compared(belief_at(sd_m=0.0, count=1), gnss=fix).unused == ()
 
 
 @pytest.mark.parametrize(
@@ -204,7 +204,7 @@ def test_before_the_first_comparison_one_is_due_and_nothing_was_met():
 def test_a_probation_ends_at_its_time():
     belief = belief_at()
     for until_s, is_used in ((10.0, True), (10.1, False)):
-        found = compared(belief, GnssState(probation_until_s=until_s), fix=fix_at(3.0))
+        found = compared(belief, GnssState(probation_until_s=until_s), gnss=fix_at(3.0))
         assert (found.unused == ()) == is_used
         assert bool(np.ptp(sum_of(found.terms, belief)) > 0.1) == is_used
         assert found.state.was_used(10.0) == is_used
@@ -213,7 +213,7 @@ def test_a_probation_ends_at_its_time():
 def test_a_fix_weighs_a_belief_whatever_its_weights_sum_to():
     belief = belief_at()
     found, again = (
-        compared(replace(belief, log_weight=belief.log_weight - by), fix=fix_at(3.0))
+        compared(replace(belief, log_weight=belief.log_weight - by), gnss=fix_at(3.0))
         for by in (0.0, 40.0)
     )
     np.testing.assert_allclose(sum_of(found.terms, belief), sum_of(again.terms, belief), atol=1e-9)
@@ -225,7 +225,7 @@ def test_without_readings_nothing_was_compared():
     assert not found.compared
     assert (found.terms, found.unused, found.under_null) == ((), (), 0.0)
     empty = replace(belief_at(), state=np.zeros((STATES, 0), "f4"), log_weight=np.zeros(0))
-    assert not compared(empty, fix=fix_at()).compared
+    assert not compared(empty, gnss=fix_at()).compared
 
 
 def test_when_satellites_were_met_used_and_are_due():
@@ -239,7 +239,7 @@ def test_when_satellites_were_met_used_and_are_due():
         (26.9, 59.9, False), (20.0, 60.0, True), (27.0, 50.0, True), (20.0, 50.0, False),
     ):  # fmt: skip
         assert compared_.due(options, time_s, travelled_m) is due
-    used = compared(belief_at(), ranges=ranges()).state
+    used = compared(belief_at(), pseudoranges=ranges()).state
     assert used.used_at_m == 100.0
     assert replace(used, fix_used_at_m=130.0).used_at_m == 130.0
     assert replace(new, receiver=used.receiver).met
@@ -276,10 +276,10 @@ def weighted_mean(belief, gain):
 def test_satellites_that_agree_lead_to_their_place(status, fresh):
     """At first with an unknown clock, then with the one that is known, 30 m on."""
     belief = belief_at((PLACE_M[0] + 6, PLACE_M[1] - 5), 10.0, status, count=3000)
-    found = compared(belief, ranges=ranges())
+    found = compared(belief, pseudoranges=ranges())
     if not fresh:
         moved = replace(found.belief, status=status)
-        found = compared(moved, found.state, 20.0, 130.0, ranges=ranges())
+        found = compared(moved, found.state, 20.0, 130.0, pseudoranges=ranges())
     gain = sum_of(found.terms, found.belief)
     assert found.unused == ()
     assert found.compared
@@ -304,7 +304,7 @@ def test_satellites_that_agree_lead_to_their_place(status, fresh):
 def test_a_first_receiver_is_at_the_stated_height():
     """Where that is known, neither it nor its rate of change is found anew."""
     sure = replace(OPTIONS, height_sd_m=0.0, drift_sd_mps=0.0)
-    found = compared(belief_at(), ranges=ranges(), gate=replace(GATE, options=sure))
+    found = compared(belief_at(), pseudoranges=ranges(), gate=replace(GATE, options=sure))
     np.testing.assert_allclose(found.state.receiver.mean[1:3], 0.0, atol=1e-9)
     np.testing.assert_allclose(found.belief.state[STATES + 1 : STATES + 3], 0.0, atol=1e-6)
 
@@ -313,7 +313,8 @@ def test_no_share_of_faulty_readings_leaves_likelihoods_as_they_are():
     gate = replace(GATE, options=replace(OPTIONS, outliers=0.0))
     belief = belief_at(sd_m=30.0)
     plain, mixed = (
-        sum_of(compared(belief, ranges=ranges(), gate=one).terms, belief) for one in (gate, GATE)
+        sum_of(compared(belief, pseudoranges=ranges(), gate=one).terms, belief)
+        for one in (gate, GATE)
     )
     np.testing.assert_allclose(mixed, np.log(0.9 * np.exp(plain) + 0.1), atol=1e-9)
     assert plain.min() < -6
@@ -322,7 +323,7 @@ def test_no_share_of_faulty_readings_leaves_likelihoods_as_they_are():
 @pytest.fixture(scope="module")
 def known():
     """A belief whose receiver is known."""
-    found = compared(belief_at(), ranges=ranges())
+    found = compared(belief_at(), pseudoranges=ranges())
     return found.belief, found.state
 
 
@@ -330,20 +331,22 @@ def test_a_satellite_that_is_far_off_is_left_out_alone(known):
     errors = np.array([1.0, -2.0, 0.5, 1.5, -1.0, 0.3])
     errors[3] += 900.0
     belief, state = known
-    found = compared(belief, state, 11.0, 101.0, ranges=ranges(errors=errors))
+    found = compared(belief, state, 11.0, 101.0, pseudoranges=ranges(errors=errors))
     assert found.unused == (("pseudorange", "G03", Reason.REJECTED_BY_EVIDENCE),)
     assert not found.state.rejecting
     assert found.state.receiver.used_at_m == 101.0
     errors[[1, 4]] -= 700.0
-    half = compared(belief, state, 11.0, 101.0, ranges=ranges(errors=errors))
+    half = compared(belief, state, 11.0, 101.0, pseudoranges=ranges(errors=errors))
     assert [name for _, name, _ in half.unused] == [f"G{k:02d}" for k in range(6)]
     assert half.state.rejecting
     assert half.state.probation_until_s == 16.0
     assert half.state.receiver.used_at_m == 100.0
     # Of three one, of two satellites none is left out alone.
-    three = compared(belief, state, 11.0, 101.0, ranges=ranges(errors=(1.0, 900.0, 0.5), count=3))
+    three = compared(
+        belief, state, 11.0, 101.0, pseudoranges=ranges(errors=(1.0, 900.0, 0.5), count=3)
+    )
     assert [name for _, name, _ in three.unused] == ["G01"]
-    two = compared(belief, state, 11.0, 101.0, ranges=ranges(errors=(900.0, 0.0), count=2))
+    two = compared(belief, state, 11.0, 101.0, pseudoranges=ranges(errors=(900.0, 0.0), count=2))
     assert len(two.unused) == 2
 
 
@@ -355,7 +358,7 @@ def test_a_tracked_belief_is_compared_as_a_whole(status, used):
     belief = belief_at(status=status)
     belief = replace(belief, log_weight=np.full(400, -np.log(400.0)))
     belief.state[EAST, :4] += 300.0
-    found = compared(belief, ranges=ranges(off_m=(300.0, 0.0)))
+    found = compared(belief, pseudoranges=ranges(off_m=(300.0, 0.0)))
     assert (found.unused == ()) is used
     if used:
         assert weighted_mean(belief, sum_of(found.terms, belief))[0] > PLACE_M[0] + 200.0
@@ -364,7 +367,7 @@ def test_a_tracked_belief_is_compared_as_a_whole(status, used):
 @pytest.mark.parametrize("off_m", [0.0, 150.0])
 def test_particles_far_apart_do_not_hide_that_a_belief_is_elsewhere(off_m):
     """Their distance widens what hypotheses are weighed by, not what the belief is compared by."""
-    epoch = Epoch(10.0, (), ranges=ranges(off_m=(off_m, 0.0)))
+    epoch = Epoch(10.0, (), pseudoranges=ranges(off_m=(off_m, 0.0)))
     found = GATE.compare(belief_at(), GnssState(), epoch, 100.0, 100.0)
     assert (found.unused == ()) is (off_m == 0.0)
 
@@ -376,26 +379,28 @@ def clock_of(found):
 
 def test_a_clock_that_jumps_is_found_anew_and_known_from_then_on(known):
     belief, state = known
-    found = compared(belief, state, 11.0, 101.0, ranges=ranges(clock_m=52_000.0))
+    found = compared(belief, state, 11.0, 101.0, pseudoranges=ranges(clock_m=52_000.0))
     assert found.unused == ()
     assert clock_of(found) == pytest.approx(52_000.0, abs=60.0)
     # So it is with errors of twice the stated deviation.
     usual = ranges(clock_m=52_000.0, errors=(6.0, -6.0, 6.0, -6.0, 6.0, -6.0))
-    assert compared(belief, state, 11.0, 101.0, ranges=usual).unused == ()
+    assert compared(belief, state, 11.0, 101.0, pseudoranges=usual).unused == ()
     # Larger ones, which a clock that is known allows, are too large for one that jumped as well.
     for clock_m, used in ((2000.0, True), (52_000.0, False)):
         large = ranges(clock_m=clock_m, errors=(8.0, -8.0, 8.0, -8.0, 8.0, -8.0))
-        assert (compared(belief, state, 11.0, 101.0, ranges=large).unused == ()) is used
+        assert (compared(belief, state, 11.0, 101.0, pseudoranges=large).unused == ()) is used
     # Another jump is found from there; without one the clock stays.
     for clock_m in (52_000.0, -300_000.0):
-        later = compared(found.belief, found.state, 12.0, 131.0, ranges=ranges(clock_m=clock_m))
+        later = compared(
+            found.belief, found.state, 12.0, 131.0, pseudoranges=ranges(clock_m=clock_m)
+        )
         assert later.unused == ()
         assert clock_of(later) == pytest.approx(clock_m, abs=60.0)
     # Far from the clock one satellite is explained by a jump, near it by the place alone.
     (one, *_) = ranges(clock_m=52_000.0, off_m=(0.0, -45.0))
     gains = []
     for before in (found, replace_clock(found, 10_000.0)):
-        later = compared(before.belief, before.state, 12.0, 201.0, ranges=(one,))
+        later = compared(before.belief, before.state, 12.0, 201.0, pseudoranges=(one,))
         gains.append(np.ptp(sum_of(later.terms, later.belief)))
     assert gains[0] > 3 * gains[1]
 
@@ -412,24 +417,24 @@ def replace_clock(found, off_m):
 def test_satellites_of_another_place_are_rejected_and_then_on_probation(known):
     belief, state = known
     elsewhere = ranges(off_m=(700.0, -500.0))
-    found = compared(belief, state, 11.0, 101.0, ranges=elsewhere)
+    found = compared(belief, state, 11.0, 101.0, pseudoranges=elsewhere)
     assert {why for *_, why in found.unused} == {Reason.REJECTED_BY_EVIDENCE}
     assert len(found.unused) == 6
     assert np.all(sum_of(found.terms, belief) == 0.0)
-    later = compared(found.belief, found.state, 15.9, 105.0, ranges=ranges())
+    later = compared(found.belief, found.state, 15.9, 105.0, pseudoranges=ranges())
     assert {why for *_, why in later.unused} == {Reason.ON_PROBATION}
     assert later.state.receiver.used_at_m == 100.0
     assert (later.state.rejected_since_s, later.state.probation_until_s) == (11.0, 16.0)
-    after = compared(later.belief, later.state, 16.0, 106.0, ranges=ranges())
+    after = compared(later.belief, later.state, 16.0, 106.0, pseudoranges=ranges())
     assert after.unused == ()
     assert not after.state.rejecting
     # A fix that is rejected takes the satellites of its epoch with it.
-    both = compared(belief, state, 11.0, 101.0, fix=fix_at(800.0), ranges=ranges())
+    both = compared(belief, state, 11.0, 101.0, gnss=fix_at(800.0), pseudoranges=ranges())
     assert ("gnss", "", Reason.REJECTED_BY_EVIDENCE) in both.unused
     assert sum(why is Reason.ON_PROBATION for *_, why in both.unused) == 6
     assert both.under_null == 0.0
     # And the other way around: one that agrees is not used, either.
-    both = compared(belief, state, 11.0, 101.0, fix=fix_at(), ranges=elsewhere)
+    both = compared(belief, state, 11.0, 101.0, gnss=fix_at(), pseudoranges=elsewhere)
     assert ("gnss", "", Reason.ON_PROBATION) in both.unused
     assert sum(why is Reason.REJECTED_BY_EVIDENCE for *_, why in both.unused) == 6
     assert (both.state.fix_used_at_m, both.state.excess) == (-inf, 1.0)
@@ -441,7 +446,7 @@ def test_a_belief_that_is_no_cloud_leaves_pseudoranges():
         def __init__(self):
             self.log_weight, self.status = np.zeros(3), Status.TRACKING
 
-    found = compared(Other(), ranges=ranges(count=2))
+    found = compared(Other(), pseudoranges=ranges(count=2))
     assert [one[1:] for one in found.unused] == [
         ("G00", Reason.NOT_USED_BY_FILTER), ("G01", Reason.NOT_USED_BY_FILTER),
     ]  # fmt: skip
@@ -450,7 +455,7 @@ def test_a_belief_that_is_no_cloud_leaves_pseudoranges():
 
 def test_satellites_that_cannot_be_used_are_told_and_nothing_is_compared():
     low = tuple(replace(one, place_m=(nan, nan, nan)) for one in ranges(count=2))
-    found = compared(belief_at(), ranges=low)
+    found = compared(belief_at(), pseudoranges=low)
     assert {why for *_, why in found.unused} == {Reason.UNKNOWN_SATELLITE}
     assert not found.compared
     assert found.state.receiver is None

@@ -63,7 +63,7 @@ def test_the_gate_compares_in_the_areas_frame():
 
 def test_first_pseudoranges_weigh_places_by_their_differences():
     """East and west, 30 degrees up: 2 m at the zenith are 4 m, and 10 m of spacing 8.66 m."""
-    epoch = Epoch(3.0, (), ranges=ranges([(90.0, 30.0), (270.0, 30.0)], (6.0, 0.0)))
+    epoch = Epoch(3.0, (), pseudoranges=ranges([(90.0, 30.0), (270.0, 30.0)], (6.0, 0.0)))
     found = SOURCE.first(epoch)
     assert found.state.receiver is None
     (term,) = found.terms
@@ -86,7 +86,7 @@ def test_first_pseudoranges_weigh_places_by_their_differences():
 
 def test_first_satellites_take_the_receiver_at_the_stated_height():
     """So that places to either side are alike; a metre would be 0.6 m of the two's difference."""
-    epoch = Epoch(3.0, (), ranges=ranges([(90.0, 80.0), (270.0, 20.0)], (0.0, 0.0)))
+    epoch = Epoch(3.0, (), pseudoranges=ranges([(90.0, 80.0), (270.0, 20.0)], (0.0, 0.0)))
     (term,) = SOURCE.first(epoch).terms
     state = np.array([[380.0, 400.0, 420.0], [300.0, 300.0, 300.0]], dtype=np.float32)
     west, middle, east = term.log_likelihood(state)
@@ -95,7 +95,7 @@ def test_first_satellites_take_the_receiver_at_the_stated_height():
 
 
 def test_a_first_receiver_that_has_lasting_errors_says_less():
-    epoch = Epoch(3.0, (), ranges=ranges([(90.0, 30.0), (270.0, 30.0)], (6.0, 0.0)))
+    epoch = Epoch(3.0, (), pseudoranges=ranges([(90.0, 30.0), (270.0, 30.0)], (6.0, 0.0)))
     (term,) = SOURCE.first(epoch).terms
     lasting = FirstRanges(term.sky, term.sigma_m, replace(OPTIONS, echo_m=50.0))
     state = np.array([[400.0, 420.0], [300.0, 300.0]], dtype=np.float32)
@@ -114,18 +114,18 @@ def test_a_first_receiver_that_has_lasting_errors_says_less():
      (SOURCE, ranges([(90.0, 10.0)], (0.0,)))],
 )  # fmt: skip
 def test_without_satellites_or_a_clock_a_belief_starts_without_them(source, given):
-    found = source.first(Epoch(3.0, (), fix=FIX, ranges=given))
+    found = source.first(Epoch(3.0, (), gnss=FIX, pseudoranges=given))
     assert found.terms == ()
     assert found.state.compared_at_m == -inf
 
 
 def test_a_first_fix_is_taken_as_it_is():
     source = FirstFix(AREA.origin_m)
-    (term,) = source.first(Epoch(1.0, (), fix=FIX)).terms
+    (term,) = source.first(Epoch(1.0, (), gnss=FIX)).terms
     assert (term.fix, term.place_m) == (FIX, (400.0, 300.0))
     assert source.first(Epoch(1.0, ())).terms == ()
     # Later ones are compared with the belief.
-    later = source.update(None, Epoch(1.0, (), fix=FIX), None)
+    later = source.update(None, Epoch(1.0, (), gnss=FIX), None)
     assert (later.state, later.terms) == (None, ())
     assert (source.name, source.kinds) == ("first fix", {"gnss"})
 
@@ -171,7 +171,7 @@ def state_of(belief="main", beside=None, travelled_m=95.0, own=OWN):
 
 
 def updated(gate, state, time_s=100.0, *, due=True, **readings):
-    readings = readings or {"fix": FIX}
+    readings = readings or {"gnss": FIX}
     context = SimpleNamespace(report_due=due, particle_spacing_m=4.0)
     return gated(gate).update(state, Epoch(time_s, (), **readings), context)
 
@@ -194,9 +194,9 @@ def test_readings_are_compared_when_a_report_is_used_or_after_a_while(
 def test_nothing_is_compared_without_readings_or_a_belief():
     gate = Gate(main=finding("main"))
     assert updated(gate, state_of(None)).state is OWN
-    assert updated(gate, state_of(), ranges=()).state is OWN
+    assert updated(gate, state_of(), pseudoranges=()).state is OWN
     assert gate.asked == []
-    assert updated(gate, state_of(), ranges=ranges([(90.0, 30.0)], (0.0,))).terms == ("main",)
+    assert updated(gate, state_of(), pseudoranges=ranges([(90.0, 30.0)], (0.0,))).terms == ("main",)
 
 
 def test_a_belief_alone_takes_what_its_comparison_finds():
@@ -250,7 +250,7 @@ def test_a_belief_that_starts_is_compared_at_once():
     assert source.start("new", Epoch(5.0, ()), 30.0)[0] == "new"
     assert source.start("new", Epoch(5.0, ()), 30.0)[1].compared_at_m == -inf
     assert gate.asked == []
-    for given in ({"fix": FIX}, {"ranges": ranges([(90.0, 30.0)], (0.0,))}):
+    for given in ({"gnss": FIX}, {"pseudoranges": ranges([(90.0, 30.0)], (0.0,))}):
         belief, state = source.start("new", Epoch(5.0, (), **given), 30.0)
         assert (belief, state.fix_used_at_m) == ("new weighed", ord("n"))
         assert gate.asked[-1][2:] == (5.0, 30.0, 10.0)

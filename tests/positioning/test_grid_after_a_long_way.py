@@ -35,7 +35,7 @@ def after(positioner, heading_rad):
 def test_a_fix_finds_the_phone_again(positioner, heading_rad):
     state, _ = after(positioner, heading_rad)
     east_m, north_m = START_M[0] + 150.0, START_M[1]
-    epoch = Epoch(400.0, (MotionStep(10.0, heading_rad),), fix=GnssFix(east_m, north_m, 9.0, 9.0))
+    epoch = Epoch(400.0, (MotionStep(10.0, heading_rad),), gnss=GnssFix(east_m, north_m, 9.0, 9.0))
     _, output = positioner.step(state, epoch, np.random.default_rng(0))
     assert np.hypot(output.fix.east_m - east_m, output.fix.north_m - north_m) < 5
     assert output.fix.radii_m[2] < 20

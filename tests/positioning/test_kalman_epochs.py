@@ -84,7 +84,7 @@ def test_where_errors_of_fixes_last_their_place_is_a_part_of_the_state():
     lasting = replace(OPTIONS, fix_lasting_m=6.0, start_sd_m=100.0)
     state = KalmanState(extended_layout(RECKONED))
     work = KalmanStep(SiteModels(PLAN, lasting), EKF, state)
-    fix = work.take(Epoch(0.0, fix=GnssFix(EAST, NORTH, 100.0, 100.0, 0.0)))
+    fix = work.take(Epoch(0.0, gnss=GnssFix(EAST, NORTH, 100.0, 100.0, 0.0)))
     assert work.belief.means.shape == (1, 7)
     # 64 of the fix's 100 m² are white, the rest lasts; a start is known to 100 m.
     place_m2 = 10_000.0 + 36.0
@@ -94,7 +94,7 @@ def test_where_errors_of_fixes_last_their_place_is_a_part_of_the_state():
     work.take(Epoch(15.0))
     kept = np.exp(-0.5)
     before = KalmanStep(SiteModels(PLAN, lasting), EKF, state)
-    before.take(Epoch(0.0, fix=GnssFix(EAST, NORTH, 100.0, 100.0, 0.0)))
+    before.take(Epoch(0.0, gnss=GnssFix(EAST, NORTH, 100.0, 100.0, 0.0)))
     old = before.belief.covariances[0]
     off_m2 = old[5, 5] - 2 * old[0, 5] + old[0, 0]
     new = work.belief.covariances[0]
@@ -119,7 +119,7 @@ def test_with_a_velocity_a_fix_that_repeats_itself_shows_a_standstill():
     same = GnssFix(EAST + 2000.0, NORTH, 25.0, 25.0, 0.0)
     for layout, used in ((MOVING, True), (RECKONED, False)):
         work = begun(layout=layout, last_fix=same)
-        fix = work.take(Epoch(10.0, fix=same))
+        fix = work.take(Epoch(10.0, gnss=same))
         assert (fix.reason is Reason.USED) is used
         assert [one.reason for one in work.unused] == ([] if used else [Reason.REPEATED_FIX])
         assert work.last_fix is same
@@ -167,7 +167,7 @@ def test_place_and_tail_are_those_of_east_and_north():
 def fixed(fix, **more):
     """The variances and the covariance of east and north after a fix, of a belief of 50 m."""
     work = begun(**more)
-    work.take(Epoch(10.0, fix=fix))
+    work.take(Epoch(10.0, gnss=fix))
     return work.belief.covariances[0, :2, :2]
 
 
@@ -197,7 +197,7 @@ def test_errors_of_fixes_last_however_small_they_are():
     """Of 4 m², which a fix states, a quarter lasts: 0.5 m on each axis, squared."""
     options = replace(OPTIONS, fix_lasting_m=0.5)
     work = KalmanStep(SiteModels(PLAN, options), EKF, KalmanState(extended_layout(RECKONED)))
-    work.take(Epoch(0.0, fix=GnssFix(EAST, NORTH, 4.0, 4.0, 0.0)))
+    work.take(Epoch(0.0, gnss=GnssFix(EAST, NORTH, 4.0, 4.0, 0.0)))
     assert work.belief.means.shape == (1, 7)
 
 

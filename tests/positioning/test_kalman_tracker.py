@@ -50,7 +50,7 @@ def test_smoothed_positions_replace_those_since_the_start():
     state, found = tracker.begin(), []
     for time_s, fix in enumerate(fixes):
         before = state
-        state, output = tracker.step(state, Epoch(float(time_s), fix=fix), RNG)
+        state, output = tracker.step(state, Epoch(float(time_s), gnss=fix), RNG)
         smoother.add(before, state)
         found.append(output.fix)
     assert len(smoother.history.beliefs) == 2

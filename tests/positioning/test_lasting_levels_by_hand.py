@@ -167,7 +167,7 @@ def walked(oracle, smoother, hears, epochs, *, level_sd_db=6.0, fixes=(0,), fix_
             ReportRow("neighbour", f"C{i}", None, None, level, 0) for i, level in reading.items()
         )
         motion = tuple(MotionStep(*step) for step in steps)
-        epoch = Epoch(2.0 * k, motion, radio=rows, fix=fix)
+        epoch = Epoch(2.0 * k, motion, radio=rows, gnss=fix)
         before, (state, found) = state, tracker.step(state, epoch, rng)
         smoother.add(before, state)
         place = np.array([found.fix.east_m, found.fix.north_m])

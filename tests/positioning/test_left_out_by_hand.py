@@ -171,5 +171,5 @@ def test_the_figures_of_errors():
     errors = Errors(error_m, np.ones(4), np.zeros(4), np.array([0, 0, 4, 4]))
     found = validation_of(NEAREST, errors, "squares of 8 m")
     assert (found.blocks, found.folds, found.reports) == ("squares of 8 m", 2, 4)
-    assert (found.mean_m, found.median_m) == (4.0, 2.5)
+    assert (found.error_mean_m, found.error_median_m) == (4.0, 2.5)
     assert found.error_95_m == pytest.approx(3.0 + 0.85 * 7.0)

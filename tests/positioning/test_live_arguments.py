@@ -48,7 +48,7 @@ def test_a_state_is_one_of_the_filter(positioner, database, other):
         positioner.step(state, EPOCH, np.random.default_rng(0))
 
 
-@pytest.mark.parametrize("name", ["motion", "radio", "ranges", "differences"])
+@pytest.mark.parametrize("name", ["motion", "radio", "pseudoranges", "tdoa"])
 def test_rows_that_can_be_gone_over_once_are_refused(positioner, name):
     given = replace(EPOCH, **{name: iter(getattr(EPOCH, name))})
     with pytest.raises(mf.MapfilterError, match=f"^epoch, {name}: expected a tuple of"):
@@ -85,10 +85,10 @@ def test_numbers_of_numpy_are_numbers(positioner):
 @pytest.mark.parametrize("kind", [tuple, list, np.array])
 def test_the_place_of_a_satellite_may_be_an_array(kind):
     given = Pseudorange("G07", 2.2e7, 5.0, kind([2.6e7, 0.0, 0.0]))
-    check_epoch(mf.Epoch(0.0, ranges=(given,)))
+    check_epoch(mf.Epoch(0.0, pseudoranges=(given,)))
     for wrong in (given.place_m[:2], kind([2.6e7, 0.0, 1e12]), np.array(2.6e7), np.zeros((3, 2))):
-        with pytest.raises(mf.MapfilterError, match=r"^epoch, ranges\[0\].place_m"):
-            check_epoch(mf.Epoch(0.0, ranges=(replace(given, place_m=wrong),)))
+        with pytest.raises(mf.MapfilterError, match=r"^epoch, pseudoranges\[0\].place_m"):
+            check_epoch(mf.Epoch(0.0, pseudoranges=(replace(given, place_m=wrong),)))
 
 
 @pytest.mark.parametrize(

@@ -198,14 +198,14 @@ def test_a_fix_that_was_not_used_yet_is_no_repetition(vehicle):
     path = drive(TOWN, 3, 100.0)
     fix = GnssFix(float(path[0, 0]), float(path[0, 1]), 9.0, 9.0, 0.0)
     state, rng = vehicle.begin(), np.random.default_rng(1)
-    state, _ = vehicle.step(state, Epoch(0.0, (MotionStep(0.0, 0.0),), fix=fix), rng)
+    state, _ = vehicle.step(state, Epoch(0.0, (MotionStep(0.0, 0.0),), gnss=fix), rng)
     assert state.last_fix == fix
     gnss = replace(state.sources["gnss"], probation_until_s=30.0)
     state = replace(state, sources={**state.sources, "gnss": gnss})
     other, reasons = replace(fix, east_m=fix.east_m + 1.0), {}
     for time_s in range(1, 61):
         state, output = vehicle.step(
-            state, Epoch(float(time_s), (MotionStep(0.0, 0.0),), fix=other), rng
+            state, Epoch(float(time_s), (MotionStep(0.0, 0.0),), gnss=other), rng
         )
         reasons[time_s] = {one.reason for one in output.unused if one.kind == "gnss"}
         if time_s <= 29:

@@ -215,9 +215,19 @@ def test_turns_alone_at_the_start_make_headings_relative(raw, gone_m, compass):
         (MotionStep(2.0, 1.0), {}, {}, False),
         (MotionStep(4.0, 2.0), {}, {}, False),
         # A position leaves no doubt; a satellite without a range is none.
-        (MotionStep(2.0, 2.0), {"fix": FIX}, {}, False),
-        (MotionStep(2.0, 2.0), {"ranges": (Pseudorange("G", 2e7, 1.0, (0, 0, 0)),)}, {}, False),
-        (MotionStep(2.0, 2.0), {"ranges": (Pseudorange("G", nan, 1.0, (0, 0, 0)),)}, {}, True),
+        (MotionStep(2.0, 2.0), {"gnss": FIX}, {}, False),
+        (
+            MotionStep(2.0, 2.0),
+            {"pseudoranges": (Pseudorange("G", 2e7, 1.0, (0, 0, 0)),)},
+            {},
+            False,
+        ),
+        (
+            MotionStep(2.0, 2.0),
+            {"pseudoranges": (Pseudorange("G", nan, 1.0, (0, 0, 0)),)},
+            {},
+            True,
+        ),
         # Who stood for longer than 3 s may have turned there.
         (MotionStep(2.0, 2.0), {}, {"stepped_s": 7.0}, True),
         (MotionStep(2.0, 2.0), {}, {"stepped_s": 6.9}, False),
@@ -274,7 +284,7 @@ def test_other_beliefs_are_moved_as_they_read_headings():
 
 
 def test_positions_that_lead_begin_a_belief_without_them():
-    for readings in ({"fix": FIX}, {"ranges": (Pseudorange("G", 2e7, 1.0, (0, 0, 0)),)}):
+    for readings in ({"gnss": FIX}, {"pseudoranges": (Pseudorange("G", 2e7, 1.0, (0, 0, 0)),)}):
         hold, null = Hold(-1.0, 0.2), NullHypothesis(-9.0)
         state = walking(belief(log_evidence=-4.0), hold=hold, null=null)
         beliefs = Beliefs(lead=True)
@@ -301,8 +311,8 @@ def test_a_belief_without_positions_is_moved_as_it_reads_headings_with_draws_of_
     assert rng.bit_generator.state == other.bit_generator.state
 
 
-FIXED = {"fix": FIX}
-RANGED = {"ranges": (Pseudorange("G", 2e7, 1.0, (0, 0, 0)),)}
+FIXED = {"gnss": FIX}
+RANGED = {"pseudoranges": (Pseudorange("G", 2e7, 1.0, (0, 0, 0)),)}
 
 
 def test_pseudoranges_leave_no_doubt_of_a_jump_and_fixes_weigh_other_beliefs():
@@ -310,7 +320,7 @@ def test_pseudoranges_leave_no_doubt_of_a_jump_and_fixes_weigh_other_beliefs():
     plain, other = turned_phone(Hold(), 4), turned_phone()
     assert move(walking(held=(plain, other)), **RANGED)[0].held == ()
     assert move(walking(held=(plain, other)), **FIXED)[0].held == (plain, other)
-    nothing = {"ranges": (Pseudorange("G", nan, 1.0, (0, 0, 0)),)}
+    nothing = {"pseudoranges": (Pseudorange("G", nan, 1.0, (0, 0, 0)),)}
     assert len(move(walking(held=(plain, other)), **nothing)[0].held) == 2
     # A heading may jump where there is a fix.
     raw = MotionStep(2.0, 2.0, 1.6)

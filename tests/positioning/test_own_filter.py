@@ -199,7 +199,7 @@ def test_satellites_alone_reach_it(tmp_path):
 
     class Watching(Counting):
         def update(self, belief, epoch, rng):
-            seen.append((len(epoch.radio), len(epoch.ranges)))
+            seen.append((len(epoch.radio), len(epoch.pseudoranges)))
             return super().update(belief, epoch, rng)
 
     log = sky_log(legs=((0.0, 30.0),), most=2)

@@ -143,7 +143,7 @@ def with_a_fix(epoch, log):
     truth = log.truth
     place = (float(np.interp(epoch.time_s, truth["time_s"], truth[name]))
              for name in ("east_m", "north_m"))  # fmt: skip
-    return replace(epoch, fix=GnssFix(*place, 25.0, 25.0))
+    return replace(epoch, gnss=GnssFix(*place, 25.0, 25.0))
 
 
 @pytest.mark.parametrize("every", [1, 3])
@@ -156,7 +156,7 @@ def test_fixes_tell_whether_the_phone_was_turned(change, every):
     for k, epoch in enumerate(epochs(log)):
         measured = with_a_fix(epoch, log)
         state, output = WATCHED.step(state, epoch if k % every else measured, rng)
-        truth, fix = measured.fix, output.fix
+        truth, fix = measured.gnss, output.fix
         off_m.append(np.hypot(fix.east_m - truth.east_m, fix.north_m - truth.north_m))
         claimed.append(fix.status is Status.TRACKING)
     assert state.hold.is_usual is (change is None)
@@ -178,7 +178,7 @@ def test_measured_positions_tell_how_headings_are_to_be_read(mistaken):
     for epoch in epochs(log):
         measured = epoch.time_s <= until_s
         state, output = WATCHED.step(state, with_a_fix(epoch, log) if measured else epoch, rng)
-        truth, fix = with_a_fix(epoch, log).fix, output.fix
+        truth, fix = with_a_fix(epoch, log).gnss, output.fix
         ends.append((np.hypot(fix.east_m - truth.east_m, fix.north_m - truth.north_m), fix.status))
     off_m, statuses = zip(*ends[-100:], strict=True)
     assert state.hold == (Hold() if mistaken else hold)
@@ -256,7 +256,7 @@ def test_steps_in_feet_are_no_other_reading_of_headings():
     state, rng = begun()
     row = (MotionStep(5.0, 0.0),)
     for hold, found in ((in_feet, []), (turned, [in_feet])):
-        measured = Epoch(1.0, row, fix=GnssFix(*START_M, 25.0, 25.0))
+        measured = Epoch(1.0, row, gnss=GnssFix(*START_M, 25.0, 25.0))
         after, _ = WATCHED.step(replace(state, hold=hold), measured, rng)
         assert [one.hold for one in after.held] == found
     other = beside(state.belief, -250.0, log_evidence=100.0)

@@ -334,7 +334,7 @@ class PressureEpoch(Epoch):
         (False, PressureEpoch(0.0)),
         (True, PressureEpoch(0.0, pressure_hpa=0.0)),
         (True, Epoch(0.0, radio=(ReportRow("serving", "A", None, None, nan, 0),))),
-        (True, Epoch(0.0, fix=GnssFix(nan, nan))),
+        (True, Epoch(0.0, gnss=GnssFix(nan, nan))),
     ],
 )
 def test_whether_an_epoch_holds_a_measurement(measured, epoch):

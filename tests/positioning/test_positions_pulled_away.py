@@ -273,7 +273,7 @@ def test_a_fix_that_the_gate_rejects_does_not_end_the_distrust():
     apart = replace(half, state=half.state + np.where(np.arange(400) % 2, 0, 60)[None].astype("f4")
                     * np.array([1, 0, 0, 0, 0, 0, 0], dtype=np.float32)[:, None])  # fmt: skip
     trusted_soon = GnssState(distrusted=True, agrees_from_m=0.0)
-    epoch = Epoch(9.0, (), fix=GnssFix(330.0, 500.0, 1.0, 1.0, 0.0))
+    epoch = Epoch(9.0, (), gnss=GnssFix(330.0, 500.0, 1.0, 1.0, 0.0))
     found = gate.compare(apart, trusted_soon, epoch, 200.0, 5.0)
     assert [one[2] for one in found.unused] == [Reason.REJECTED_BY_EVIDENCE]
     assert found.state.distrusted
@@ -293,8 +293,8 @@ def test_a_fix_and_pseudoranges_together_leave_the_total_likelihood_as_it_is():
 
 
 def test_positions_in_doubt_are_told_once_each():
-    epoch = Epoch(9.0, (), fix=GnssFix(1.0, 2.0, 9.0, 9.0, 0.0),
-                  ranges=(Pseudorange("G01", 2e7, 1.0, (0, 0, 0)),))  # fmt: skip
+    epoch = Epoch(9.0, (), gnss=GnssFix(1.0, 2.0, 9.0, 9.0, 0.0),
+                  pseudoranges=(Pseudorange("G01", 2e7, 1.0, (0, 0, 0)),))  # fmt: skip
     why = Reason.REJECTED_BY_EVIDENCE
     assert positions_in_doubt(epoch, []) == [
         UnusedReading(9.0, "gnss", "", why), UnusedReading(9.0, "pseudorange", "G01", why),

@@ -103,7 +103,7 @@ def located(steps, seen, sd_m=5.0):
     places, statuses, turned = [], [], False
     for k, (step, one) in enumerate(zip(steps, seen.tolist(), strict=True)):
         fix = GnssFix(EAST + one.real, NORTH + one.imag, sd_m**2, sd_m**2, 0.0)
-        state, out = tracker.step(state, Epoch(float(k), (step,), fix=fix), rng)
+        state, out = tracker.step(state, Epoch(float(k), (step,), gnss=fix), rng)
         places.append(complex(out.fix.east_m - EAST, out.fix.north_m - NORTH))
         statuses.append(out.fix.status)
         turned |= any(one.reason is Reason.PHONE_TURNED for one in out.unused)

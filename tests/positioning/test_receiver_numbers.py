@@ -263,7 +263,7 @@ def test_the_satellites_of_an_epoch_over_a_place():
         Pseudorange("G05", np.nan, 3.0, satellite(0.0, 60.0)),
     )
     origin_m = east_m - 400.0, north_m - 300.0
-    epoch = Epoch(0.0, (), ranges=rows)
+    epoch = Epoch(0.0, (), pseudoranges=rows)
     sky, unused = sky_over(options, CRS, origin_m, epoch, (400.0, 300.0))
     assert sky.names == ("G01", "G02")
     assert set(unused) == {
@@ -282,8 +282,11 @@ def test_the_satellites_of_an_epoch_over_a_place():
     np.testing.assert_allclose(sky.satellites_m[:, 2], up_m, atol=0.05)
     frame = GridFrame(CRS, east_m, north_m, HEIGHT_M)
     np.testing.assert_array_equal(sky.true_from_grid, frame.true_from_grid)
-    low = replace(epoch, ranges=rows[3:4])
+    low = replace(epoch, pseudoranges=rows[3:4])
     assert sky_over(options, CRS, origin_m, low, (400.0, 300.0)) == (
         None, (("pseudorange", "G03", Reason.BELOW_HORIZON),),
     )  # fmt: skip
-    assert sky_over(options, CRS, origin_m, replace(epoch, ranges=()), (0.0, 0.0)) == (None, ())
+    assert sky_over(options, CRS, origin_m, replace(epoch, pseudoranges=()), (0.0, 0.0)) == (
+        None,
+        (),
+    )

@@ -64,7 +64,7 @@ def test_positions_find_how_a_compass_is_mounted(method, askew_deg, longer):
         rng = np.random.default_rng(seed)
         steps, way = walk(rng, 900, askew_deg=askew_deg, longer=longer)
         fixes = [at(place, 5.0, rng) if k < 300 else None for k, place in enumerate(way)]
-        made = [Epoch(float(k), (step,), fix=fixes[k]) for k, step in enumerate(steps)]
+        made = [Epoch(float(k), (step,), gnss=fixes[k]) for k, step in enumerate(steps)]
         places, radii_m, statuses, _, state = followed(made, method)
         off_m = np.abs(places - way)[330:]
         assert off_m.max() < 60.0
@@ -82,7 +82,7 @@ def test_positions_find_how_a_compass_is_mounted(method, askew_deg, longer):
 def test_without_positions_the_radius_grows_as_headings_may_be_off():
     """By 10° and 3 % of the way, along a straight one, and by a random walk of the heading."""
     steps = [MotionStep(1.0, 0.3)] * 1000
-    first = Epoch(0.0, fix=GnssFix(EAST, NORTH, 1e-4, 1e-4, 0.0))
+    first = Epoch(0.0, gnss=GnssFix(EAST, NORTH, 1e-4, 1e-4, 0.0))
     made = [first, *(Epoch(1e-6 * k, (step,)) for k, step in enumerate(steps, 1))]
     _, _, _, _, state = followed(made)
     covariance = state.belief.moments.covariance[:2, :2]
@@ -159,7 +159,7 @@ def test_positions_find_the_bias_of_a_gyroscope(rate_deg_per_s):
         turn += radians(rate_deg_per_s)
         steps = [MotionStep(8.0, nan, one) for one in turn]
         fixes = [at(place, 5.0, rng) if k < 600 else None for k, place in enumerate(way)]
-        made = [Epoch(float(k), (step,), fix=fixes[k]) for k, step in enumerate(steps)]
+        made = [Epoch(float(k), (step,), gnss=fixes[k]) for k, step in enumerate(steps)]
         places, radii_m, _, _, state = followed(made)
         off_m = np.abs(places - way)[630:]
         assert (off_m <= radii_m[630:]).mean() > 0.95
@@ -195,7 +195,7 @@ def test_an_odometer_of_zeros_with_a_corner_is_dead(dead):
         MotionStep(0.0 if gone else 8.0, nan, one) for gone, one in zip(lost, turn, strict=True)
     ]
     fixes = [at(place, 5.0, rng) if k < 180 else None for k, place in enumerate(way)]
-    made = [Epoch(float(k), (step,), fix=fixes[k]) for k, step in enumerate(steps)]
+    made = [Epoch(float(k), (step,), gnss=fixes[k]) for k, step in enumerate(steps)]
     places, radii_m, _, why, _ = followed(made)
     stuck = [k for k, one in enumerate(why) if Reason.MOTION_STUCK in one]
     assert stuck == (list(range(211, 230)) if dead else [])
@@ -268,7 +268,7 @@ def test_dead_sensors_do_not_leave_a_narrow_belief_behind(fault):
             if fault == "paused":
                 continue
             step = None if fault == "ended" else MotionStep(nan, 0.0)
-        made.append(Epoch(float(k), () if step is None else (step,), radio=heard, fix=fix))
+        made.append(Epoch(float(k), () if step is None else (step,), radio=heard, gnss=fix))
     places, radii_m, _, why, _ = followed(made)
     expected = {"paused": Reason.MOTION_MISSING, "ended": Reason.MOTION_MISSING,
                 "no length": Reason.NO_STEP}[fault]  # fmt: skip
@@ -288,7 +288,7 @@ def test_one_step_that_nothing_can_have_gone_is_none():
     steps, way = walk(rng, 100)
     steps[80] = MotionStep(5000.0, steps[80].heading_rad)
     made = [Epoch(float(k), (step,)) for k, step in enumerate(steps)]
-    made[0] = Epoch(0.0, fix=at(way[0], 1.0, rng))
+    made[0] = Epoch(0.0, gnss=at(way[0], 1.0, rng))
     places, radii_m, _, why, _ = followed(made)
     assert why[80] == {Reason.IMPOSSIBLE_STEP}
     assert (np.abs(places - way) <= radii_m).mean() > 0.95
@@ -347,7 +347,7 @@ def test_a_report_that_stands_still_while_one_walks_is_not_used():
             ReportRow("neighbour", name, None, None, level - i, 0) for i, name in enumerate("AAAA")
         )
         fix = GnssFix(EAST, NORTH, 25.0, 25.0, 0.0) if k == 0 else None
-        made.append(Epoch(float(k), (MotionStep(1.4, 0.01 * k),), radio=heard, fix=fix))
+        made.append(Epoch(float(k), (MotionStep(1.4, 0.01 * k),), radio=heard, gnss=fix))
     tracker = KalmanTracker(SiteModels(PLAN, OPTIONS), EKF)
     state, stale = tracker.begin(("motion", "neighbour", "gnss")), 0
     for epoch in made:

@@ -178,7 +178,7 @@ def test_where_the_prediction_is_rough_levels_count_less():
 def test_a_fix_is_a_clipped_gaussian_about_its_place(fix, covariance):
     state, expected = hypotheses(50), []
     log_weight = np.zeros(50)
-    update = FirstFix(AREA.origin_m).first(Epoch(0.0, fix=fix))
+    update = FirstFix(AREA.origin_m).first(Epoch(0.0, gnss=fix))
     reading = RadioReading(terms=update.terms)
     _, reason = BayesModel(AREA).weigh(Cloud(state, np.empty((0, 50), "f4")), log_weight, reading)
     assert reason is Reason.USED

@@ -112,7 +112,7 @@ def test_a_phone_that_was_turned_begins_with_a_receiver_of_its_own(area):
     after = replace(state, hold=Hold(offset_rad=1.0), held=(held,), sources=sources)
     rest = [one for one in epochs(log) if one.time_s > epoch.time_s]
     while after.takeovers == state.takeovers:
-        after, _ = positioner.step(after, replace(rest.pop(0), ranges=()), rng)
+        after, _ = positioner.step(after, replace(rest.pop(0), pseudoranges=()), rng)
     assert after.hold == Hold()
     receiver = after.sources["gnss"].receiver
     assert after.sources["gnss"].compared_at_s == gnss.compared_at_s
@@ -303,11 +303,11 @@ def test_the_exact_filter_takes_fixes_and_rejects_lies(area):
 def test_a_fix_of_no_place_is_no_fix_before_a_start_neither(area, kind):
     positioner = kind(**FEW, **HEIGHTS).over_area(area)
     row = ReportRow("serving", "W", None, None, np.nan, 0)
-    blank, report = Epoch(0.0, fix=GnssFix(np.nan, 1.0)), Epoch(1.0, radio=(row,))
+    blank, report = Epoch(0.0, gnss=GnssFix(np.nan, 1.0)), Epoch(1.0, radio=(row,))
     rng, other = np.random.default_rng(0), np.random.default_rng(0)
     nothing, news = positioner.step(positioner.begin(), blank, rng)
     assert (nothing.belief, news.fix.hypotheses) == (None, 0)
-    _, told = positioner.step(nothing, replace(report, fix=blank.fix), rng)
+    _, told = positioner.step(nothing, replace(report, gnss=blank.gnss), rng)
     _, plain = positioner.step(positioner.begin(), report, other)
     assert told.fix.east_m == plain.fix.east_m
     np.testing.assert_array_equal(told.fix.radii_m, plain.fix.radii_m)

@@ -121,9 +121,9 @@ def test_a_rest_goes_on_in_what_waits():
     "measured",
     [
         {"radio": (ReportRow("serving", "A", None, None, -70.0, 0, nan),)},
-        {"fix": GnssFix(0.0, 0.0, 9.0, 9.0, 0.0)},
-        {"ranges": (Pseudorange("G01", 2e7, 3.0, (2e7, 0.0, 0.0)),)},
-        {"differences": (Difference("A", "B", 40.0, 10.0),)},
+        {"gnss": GnssFix(0.0, 0.0, 9.0, 9.0, 0.0)},
+        {"pseudoranges": (Pseudorange("G01", 2e7, 3.0, (2e7, 0.0, 0.0)),)},
+        {"tdoa": (Difference("A", "B", 40.0, 10.0),)},
     ],
 )
 def test_nothing_waits_for_what_is_measured(measured):

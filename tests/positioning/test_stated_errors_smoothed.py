@@ -59,7 +59,7 @@ def test_positions_are_those_of_one_gaussian():
     for k, stated_m in enumerate(STATED_M):
         fix = GnssFix(EAST + places_m[k], NORTH, stated_m**2, stated_m**2, 0.0)
         step, before = (MotionStep(STEP_M, 0.0),) if k else (), state
-        state, _ = tracker.step(state, Epoch(float(k), step, fix=fix), rng)
+        state, _ = tracker.step(state, Epoch(float(k), step, gnss=fix), rng)
         smoother.add(before, state)
     means_m, variances_m2 = jointly(places_m, STATED_M)
     later = smoother.history.smoothed()

@@ -95,11 +95,20 @@ def test_a_row_that_is_none_of_a_log_is_named(row, fault):
         (Epoch(0.0, motion=MotionStep(1.0, 0.0)), "epoch, motion: expected a tuple of MotionStep"),
         (Epoch(0.0, motion=(1.0,)), "epoch, motion[0]: expected a MotionStep, found 1.0"),
         (Epoch(0.0, motion=(MotionStep(1.0, 90.0),)), "motion[0].heading_rad: expected radians"),
-        (Epoch(0.0, fix=(1.0, 2.0)), "epoch, fix: expected a GnssFix, found (1.0, 2.0)"),
-        (Epoch(0.0, fix=GnssFix(None, 2.0)), "epoch, fix.east_m: expected metres east, found None"),
-        (Epoch(0.0, ranges=(replace(SATELLITE, range_m="far"),)), "metres, found 'far'"),
-        (Epoch(0.0, ranges=(replace(SATELLITE, place_m=(0.0, None, 0.0)),)), "place_m, y_m: "),
-        (Epoch(0.0, differences=(replace(DIFFERENCE, cell=None),)), "[0].cell: expected a cell id"),
+        (Epoch(0.0, gnss=(1.0, 2.0)), "epoch, gnss: expected a GnssFix, found (1.0, 2.0)"),
+        (
+            Epoch(0.0, gnss=GnssFix(None, 2.0)),
+            "epoch, gnss.east_m: expected metres east, found None",
+        ),
+        (
+            Epoch(0.0, pseudoranges=(replace(SATELLITE, pseudorange_m="far"),)),
+            "metres, found 'far'",
+        ),
+        (
+            Epoch(0.0, pseudoranges=(replace(SATELLITE, place_m=(0.0, None, 0.0)),)),
+            "place_m, y_m: ",
+        ),
+        (Epoch(0.0, tdoa=(replace(DIFFERENCE, cell=None),)), "[0].cell: expected a cell id"),
         ({"time_s": 0.0}, "epoch: expected an Epoch, found {'time_s': 0.0}"),
     ],
 )

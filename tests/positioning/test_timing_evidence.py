@@ -90,29 +90,29 @@ def test_advances_of_one_report_are_one_term_beside_rows_without_any(area):
 def test_differences_count_by_what_is_new_of_them(area):
     rows = (Difference("E", "W", 120.0, 5.0, 8.0), Difference("W", "E", -115.0, 5.0, 8.0))
     options = replace(LTE, difference_memory_m=20.0)
-    update = read(area, Epoch(0.0, differences=rows), (7.0, 30.0), 34.0, options)
+    update = read(area, Epoch(0.0, tdoa=rows), (7.0, 30.0), 34.0, options)
     assert update.state == TimingState(7.0, 34.0)
     share = 1 - np.exp(-2 * 4.0 / 20.0)
     assert [term.weight for term in update.terms] == pytest.approx([share] * 2)
     assert [term.reading_m.tolist() for term in update.terms] == [[120.0], [-115.0]]
     # Nothing of them is new where they were used.
-    same = read(area, Epoch(0.0, differences=rows), (7.0, 34.0), 34.0, options)
+    same = read(area, Epoch(0.0, tdoa=rows), (7.0, 34.0), 34.0, options)
     assert (same.terms, same.state) == ((), TimingState(7.0, 34.0))
 
 
 def test_deviations_that_are_not_stated_are_the_usual_ones(area):
     """30 m of each time of arrival, as a distance."""
     options = replace(LTE, difference_sd_m=30.0)
-    usual = read(area, Epoch(0.0, differences=(Difference("E", "W", 120.0),)), options=options)
+    usual = read(area, Epoch(0.0, tdoa=(Difference("E", "W", 120.0),)), options=options)
     np.testing.assert_allclose(usual.terms[0].model.noise, [[2 * 30.0**2]])
     stated = Difference("E", "W", 120.0, 5.0, 8.0)
-    found = read(area, Epoch(0.0, differences=(stated,)), options=options)
+    found = read(area, Epoch(0.0, tdoa=(stated,)), options=options)
     np.testing.assert_allclose(found.terms[0].model.noise, [[5.0**2 + 8.0**2]])
 
 
 def test_differences_share_the_error_of_their_reference(area):
     rows = (Difference("E", "W", 120.0, 5.0, 8.0), Difference("NW", "W", -40.0, 12.0, 8.0))
-    update = read(area, Epoch(0.0, differences=rows))
+    update = read(area, Epoch(0.0, tdoa=rows))
     assert (update.state, update.unused) == (TimingState(-inf, 0.0), [])
     place = state((150.0, 150.0))
     sites = np.array([[400.0, 150.0], [0.0, 300.0]])
@@ -134,7 +134,7 @@ def test_readings_of_unknown_cells_are_reported_unused(area):
         Difference("E", "W", 4.0), Difference("W", "W", 0.0),
     )  # fmt: skip
     heard = (ReportRow("serving", "??", None, None, nan, 0, 2.0),)
-    update = read(area, Epoch(0.0, radio=heard, differences=rows))
+    update = read(area, Epoch(0.0, radio=heard, tdoa=rows))
     assert len(update.terms) == 1
     assert [(u.kind, u.what, u.reason) for u in update.unused] == [
         ("ta", "??", Reason.UNKNOWN_CELL),

@@ -52,7 +52,7 @@ def followed(steps, fixes, *, method=EKF, heard_first=False, options=None, smoot
     for k, (step, fix) in enumerate(zip(steps, fixes, strict=True)):
         heard = (ReportRow("serving", "A", None, None, -70.0, 0),) if heard_first and k == 0 else ()
         before = state
-        state, out = tracker.step(state, Epoch(float(k), (step,), radio=heard, fix=fix), rng)
+        state, out = tracker.step(state, Epoch(float(k), (step,), radio=heard, gnss=fix), rng)
         if smoother is not None:
             smoother.add(before, state)
         places.append(complex(out.fix.east_m - EAST, out.fix.north_m - NORTH))
@@ -268,7 +268,7 @@ def test_a_jump_is_no_loss():
     tracker = KalmanTracker(SiteModels(PLAN, KalmanOptions()), EKF)
     state, found = tracker.begin(("motion", "gnss")), []
     for k, (step, fix) in enumerate(zip(steps, fixes, strict=True)):
-        state, out = tracker.step(state, Epoch(float(k), (step,), fix=fix), rng)
+        state, out = tracker.step(state, Epoch(float(k), (step,), gnss=fix), rng)
         turned = any(one.reason is Reason.PHONE_TURNED for one in out.unused)
         found.append((turned, out.fix.status, len(state.recent_nis)))
     (at,) = [k for k, (turned, _, _) in enumerate(found) if turned]

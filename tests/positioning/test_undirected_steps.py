@@ -128,7 +128,7 @@ def test_steps_with_directions_or_before_any_position_stay_as_they_are():
         (placed, [step(np.nan)]),
     ):
         for number, row in enumerate(rows):
-            given = Epoch(float(number), (row,), fix=fix_at(0.0))
+            given = Epoch(float(number), (row,), gnss=fix_at(0.0))
             way, epoch, unused = way.spread(given)
             assert (epoch, unused) == (given, [])
         assert not way.is_blind
@@ -145,9 +145,9 @@ def test_along_ways_steps_become_legs_and_no_position_is_left_out():
     assert way.is_blind
     # What waits goes before a position, and each position is used.
     for number in range(11, 14):
-        given = Epoch(float(number), (step(1.0),), fix=fix_at(float(number)))
+        given = Epoch(float(number), (step(1.0),), gnss=fix_at(float(number)))
         way, epoch, unused = way.spread(given, by_ways=True)
-        assert (epoch.fix, unused) == (given.fix, [])
+        assert (epoch.gnss, unused) == (given.gnss, [])
         assert epoch.motion[0].step_m == (4.0 if number == 11 else 1.0)
     # Way back is none that waits.
     way, epoch, _ = way.spread(Epoch(20.0, (step(5.0), step(-5.0))), by_ways=True)
@@ -166,8 +166,8 @@ def test_along_ways_steps_become_legs_and_no_position_is_left_out():
     way, epoch, _ = directed.spread(Epoch(1.0, (step(20.0),)), by_ways=True)
     assert np.isfinite(epoch.motion[0].spread_m)
     way = way.positioned()
-    _, epoch, unused = way.spread(Epoch(2.0, (step(1.0),), fix=fix_at(21.0)), by_ways=True)
-    assert (epoch.fix, len(unused)) == (None, 1)
+    _, epoch, unused = way.spread(Epoch(2.0, (step(1.0),), gnss=fix_at(21.0)), by_ways=True)
+    assert (epoch.gnss, len(unused)) == (None, 1)
 
 
 @pytest.mark.parametrize("rest", [(), (step(0.0),)])
@@ -176,7 +176,7 @@ def test_what_waits_goes_before_a_position_at_rest(rest):
     for number in range(3):
         way, epoch, _ = way.spread(Epoch(float(number), (step(2.5),)), by_ways=True)
         lengths_m += [one.step_m for one in epoch.motion]
-    way, epoch, _ = way.spread(Epoch(3.0, rest, fix=fix_at(7.5)), by_ways=True)
+    way, epoch, _ = way.spread(Epoch(3.0, rest, gnss=fix_at(7.5)), by_ways=True)
     assert sum(lengths_m) + sum(one.step_m for one in epoch.motion) == 7.5
     assert way.waiting_m == 0
     assert all(one.is_undirected for one in epoch.motion)
@@ -222,10 +222,10 @@ def test_a_direction_holds_for_some_metres(heading_rad, turn_rad):
         [],
     )
     for number in range(2, 14):
-        way, epoch, _ = way.spread(Epoch(float(number), (step(),), fix=fix_at(0.0)))
+        way, epoch, _ = way.spread(Epoch(float(number), (step(),), gnss=fix_at(0.0)))
         (one,) = epoch.motion
         directions.append((one.heading_rad, one.turn_rad))
-        used.append(epoch.fix is not None)
+        used.append(epoch.gnss is not None)
     ahead, unknown = [(heading_rad, 0.0)] * 5, [(np.nan, np.nan)] * 7
     np.testing.assert_array_equal(directions, ahead + unknown)
     # Then the next position is that after 14 m, as 12.5 m apart is far enough.
@@ -249,12 +249,12 @@ def test_positions_less_than_some_deviations_of_way_apart_are_left_out(apart_m, 
     for number in range(1, 31):
         at_m = number * STEP_M
         has_fix = at_m % apart_m == 0
-        given = Epoch(float(number), (step(),), fix=fix_at(at_m, sd_m) if has_fix else None)
+        given = Epoch(float(number), (step(),), gnss=fix_at(at_m, sd_m) if has_fix else None)
         way, epoch, unused = way.spread(given)
-        if epoch.fix is not None:
+        if epoch.gnss is not None:
             found.append(at_m)
             way = way.positioned()
-        left_out = has_fix and epoch.fix is None
+        left_out = has_fix and epoch.gnss is None
         assert [one.reason for one in unused] == [Reason.NOT_MOVED_ENOUGH] * left_out
     assert found == used
 
@@ -298,7 +298,7 @@ def test_a_known_start_is_left_by_steps_without_directions(town):
     first = log.truth.iloc[0]
     state = bayes.begin_at(first["east_m"], first["north_m"], 10.0, rng)
     for number, epoch in enumerate(epochs(log)):
-        state, output = bayes.step(state, replace(epoch, fix=None), rng)
+        state, output = bayes.step(state, replace(epoch, gnss=None), rng)
         fix, true_m = output.fix, log.truth.iloc[number]
         off_m = np.hypot(fix.east_m - true_m["east_m"], fix.north_m - true_m["north_m"])
         assert fix.status not in FOUND or off_m < 60

@@ -405,7 +405,7 @@ def placed(watch, *times_s, mps=10.0, step_m=0.0, begin_s=0.0):
     """Follow a phone that positions show on its way to the east, whatever its counter does."""
     for time_s in times_s:
         fix = GnssFix(mps * (time_s - begin_s), 0.0)
-        row = Epoch(time_s, (MotionStep(step_m, 0.01 * time_s),), fix=fix)
+        row = Epoch(time_s, (MotionStep(step_m, 0.01 * time_s),), gnss=fix)
         watch, seen, (why, _) = watched(watch, row)
     return watch, seen, why
 

@@ -47,6 +47,7 @@ def good(tmp_path_factory):
     rasters = mf.open_rasters(raster, "level")
     write_cell_plan(database.plan, folder / "cells.csv")
     world = {"rasters": rasters, "roads": "helsinki"}
+    located = mf.locate(log, database, "candidate")
     return {
         "bound": {"database": database},
         "build": {
@@ -62,13 +63,15 @@ def good(tmp_path_factory):
         "open_database": {"path": database.path},
         "open_rasters": {"path": raster},
         "read_cell_plan": {"path": folder / "cells.csv", "crs": log.crs},
+        "read_estimate": {"path": folder / "track.parquet"},
         "read_fingerprint_table": {"path": folder / "table.csv"},
         "read_log": {"paths": folder},
         "read_routes": {"roads": "helsinki", "lattice": LATTICE},
         "save_picture": {"picture": Figure(), "path": folder / "picture.png"},
-        "score": {"track": mf.locate(log, database, "candidate"), "truth": log.truth},
-        "simulate": world | {"cells": database.plan},
+        "score": {"track": located, "truth": log.truth},
+        "simulate": world | {"plan": database.plan},
         "sweep": world | {"database": database, "filters": {"a": "bayes"}},
+        "write_estimate": {"track": located, "path": folder / "track.parquet"},
         "write_log": {"log": log, "folder": folder / "log"},
     }
 

@@ -130,7 +130,7 @@ def test_true_positions_beside_the_meridian_of_greenwich_count(lon_deg, believed
     east_m, north_m = (float(axis[0]) for axis in project(crs, [lon_deg], [51.49]))
     row = ReportRow("serving", "W", None, None, -70.0, 0)
     radio = () if believed else (row,)
-    epoch = Epoch(0.0, radio=radio, fix=GnssFix(east_m, north_m))
+    epoch = Epoch(0.0, radio=radio, gnss=GnssFix(east_m, north_m))
     # Only whether there is a belief counts.
     before = BayesState(belief=object() if believed else None)
     check_fixes([epoch], before, lattice)

@@ -185,15 +185,15 @@ def test_whole_numbers_may_have_a_point(cross, whole):
 
 def test_positions_may_be_as_phones_give_them(cross):
     row = {"lat_deg": 41.15, "lon_deg": -8.62, "accuracy_m": 7.575}
-    fix = read_epochs(epoch(gnss=[row]), PlanNames(cross.plan), nan)[0].fix
+    fix = read_epochs(epoch(gnss=[row]), PlanNames(cross.plan), nan)[0].gnss
     lon_deg, lat_deg = unproject(CRS, fix.east_m, fix.north_m)
     assert (lat_deg, lon_deg) == pytest.approx((41.15, -8.62), abs=1e-9)
     # 68 % of a circular normal distribution lie within 1.515 deviations.
     assert (fix.var_east_m2, fix.var_north_m2) == pytest.approx((25.0, 25.0), rel=1e-3)
     assert fix.cov_east_north_m2 == 0
     bare = read_epochs(epoch(gnss=[{**row, "accuracy_m": None}]), PlanNames(cross.plan), nan)
-    assert np.isnan(bare[0].fix.var_east_m2)
-    assert bare[0].fix.east_m == fix.east_m
+    assert np.isnan(bare[0].gnss.var_east_m2)
+    assert bare[0].gnss.east_m == fix.east_m
 
 
 @pytest.mark.parametrize(
@@ -528,7 +528,7 @@ def test_a_position_that_is_none_counts_as_none(cross, row):
     assert placeless_note(epoch(gnss=[{"lat_deg": 0.0, "lon_deg": 8.0}], radio=None)) == ()
     metres = epoch(gnss=[{"east_m": 0.0, "north_m": 0.0}])
     assert placeless_note(metres) == ()
-    assert read_epochs(metres, names, nan)[0].fix is not None
+    assert read_epochs(metres, names, nan)[0].gnss is not None
 
 
 @pytest.mark.parametrize("row", [{"lat_deg": 0, "lon_deg": None}, {"lat_deg": 41.0}], ids=str)

@@ -75,10 +75,10 @@ def test_whatever_a_saved_class_holds_can_be_saved(name):
 def test_a_state_with_a_fix_comes_back(positioner):
     epoch = next(one for one in epochs(documents()[1]) if one.radio)
     west_m, south_m = positioner.area.origin_m
-    given_fix = replace(epoch, fix=GnssFix(west_m + 50.0, south_m + 50.0, 9.0, 9.0, 0.0))
+    given_fix = replace(epoch, gnss=GnssFix(west_m + 50.0, south_m + 50.0, 9.0, 9.0, 0.0))
     state, _ = positioner.step(positioner.begin(), given_fix, np.random.default_rng(0))
     again = decode(encode({"state": state}), "made")["state"]
-    assert again.last_fix == state.last_fix == given_fix.fix
+    assert again.last_fix == state.last_fix == given_fix.gnss
     assert repr(again.watch.repeats) == repr(state.watch.repeats)
 
 

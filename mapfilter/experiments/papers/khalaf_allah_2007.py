@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
+from mapfilter.errors import ConfigError, fail
 from mapfilter.evaluation.success_cells import SuccessCell, success_cells
 from mapfilter.experiments.papers.paper import Paper, PaperSettings, Picture
 from mapfilter.experiments.sweep.plan import Radio, Reading, SweepPlan, noise_grid
@@ -178,7 +179,10 @@ class PaperRun(NamedTuple):
 
 
 def run_paper(settings: PaperSettings) -> PaperRun:
-    """Predict, build and run all sweeps."""
+    """Predict, build and run all sweeps; ConfigError where nothing makes the map."""
+    if settings.sweep is None:
+        hint = "mapfilter.workflows.reproduce.run_reproduce makes the map"
+        raise fail(ConfigError, "PaperSettings, sweep", "what runs sweeps over a map", "None", hint)
     area_map, runs = settings.sweep(MAP_SETTINGS, plans(settings.trials, settings.seed))
     cells = success_cells(runs)
     return PaperRun(area_map, runs, cells, fits(cells))

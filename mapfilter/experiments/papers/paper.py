@@ -31,11 +31,12 @@ class PaperSettings:
     ----------
     trials : int
         Trials, or runs in each cell of a grid.
-    executor : concurrent.futures.Executor
-        Does the independent parts of the work.
-    sweep : callable
+    executor : concurrent.futures.Executor, optional
+        Does the independent parts of the work; this process when left out.
+    sweep : callable, optional
         Predicts and builds the map that settings (``section.key=value``) describe, runs sweeps over
-        it, and returns the map's name and the rows of all runs.
+        it, and returns the map's name and the rows of all runs; only for papers that run on a map,
+        which :func:`mapfilter.workflows.reproduce.run_reproduce` gives one.
     progress : callable, optional
         Called with parts of the work done and parts in all.
     layout_file : Path, optional
@@ -43,9 +44,9 @@ class PaperSettings:
     """
 
     trials: int
-    seed: int
-    executor: Executor
-    sweep: Callable[[Sequence[str], Sequence[SweepPlan]], tuple[str, pd.DataFrame]]
+    seed: int = 0
+    executor: Executor | None = None
+    sweep: Callable[[Sequence[str], Sequence[SweepPlan]], tuple[str, pd.DataFrame]] | None = None
     progress: Progress | None = None
     layout_file: Path | None = None
 

@@ -6,13 +6,15 @@ import dataclasses
 import hashlib
 import itertools
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from math import ceil, isfinite, prod
+from numbers import Real
 from typing import Any
 
 import numpy as np
 
+from mapfilter._arguments import Argument, check_arguments, shown
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.positioning import BUILT_IN
 from mapfilter.positioning.bayes.options import GridFilter
@@ -256,27 +258,48 @@ def _effective(choice: FilterOptions) -> FilterOptions:
 
 
 def noise_grid(
-    sigma_trans_m: Sequence[float] = (0.2,),
-    sigma_orient_deg: Sequence[float] = (3.0,),
-    bias_sd_deg: Sequence[float] = (0.0,),
-    drift_deg_per_sqrt_s: Sequence[float] = (0.0,),
-    scale: Sequence[float] = (0.0,),
+    sigma_trans_m: Sequence[float] | float = (0.2,),
+    sigma_orient_deg: Sequence[float] | float = (3.0,),
+    bias_sd_deg: Sequence[float] | float = (0.0,),
+    drift_deg_per_sqrt_s: Sequence[float] | float = (0.0,),
+    scale: Sequence[float] | float = (0.0,),
     *,
     others: ImuNoise | None = None,
 ) -> tuple[ImuNoise, ...]:
     """Return every combination, the last axis changing fastest; ``others`` gives what is not here.
+
+    Raises
+    ------
+    ConfigError
+        An axis has no numbers, or is none.
 
     Examples
     --------
     >>> [noise.sigma_orient_deg for noise in noise_grid((0.0, 0.2), (0, 3))]
     [0.0, 3.0, 0.0, 3.0]
     """
-    axes = sigma_trans_m, sigma_orient_deg, bias_sd_deg, drift_deg_per_sqrt_s, scale
+    usual = Argument("others", others, ImuNoise | None, "ImuNoise")
+    check_arguments("noise_grid", keywords=[usual])
+    given = sigma_trans_m, sigma_orient_deg, bias_sd_deg, drift_deg_per_sqrt_s, scale
+    faults = Faults()
+    axes = [_axis(name, one, faults) for name, one in zip(NOISE_AXES, given, strict=True)]
+    faults.raise_if_any(ConfigError)
     found = []
     for values in itertools.product(*axes):
         chosen: dict[str, Any] = dict(zip(NOISE_AXES, map(float, values), strict=True))
         found.append(replace(others or ImuNoise(), **chosen))
     return tuple(found)
+
+
+def _axis(name: str, given: object, faults: Faults) -> list[Any]:
+    """Return the values of an axis of a grid, one or several."""
+    values: list[Any] = [given]
+    if not isinstance(given, str | Real) and isinstance(given, Iterable):
+        values = list(given)
+    wrong = [shown(one) for one in values if not isinstance(one, Real)]
+    if wrong or not values:
+        faults.add(f"noise_grid, {name}", "numbers", *(wrong[:1] or ["none"]))
+    return values
 
 
 def _plain(value: object) -> object:

@@ -54,8 +54,8 @@ def _motion(epoch: Epoch, why: Reason) -> UnusedReading:
 
 def positions_in_doubt(epoch: Epoch, unused: Sequence[UnusedReading]) -> list[UnusedReading]:
     """Return the positions of an epoch as rejected, but for those that are unused already."""
-    given = [("gnss", "")] if epoch.fix is not None else []
-    given += [("pseudorange", one.satellite) for one in epoch.ranges]
+    given = [("gnss", "")] if epoch.gnss is not None else []
+    given += [("pseudorange", one.satellite) for one in epoch.pseudoranges]
     known = {(one.kind, one.what) for one in unused}
     why = Reason.REJECTED_BY_EVIDENCE
     return [UnusedReading(epoch.time_s, *one, why) for one in given if one not in known]

@@ -235,10 +235,10 @@ class BayesPositioner(Filter[BayesState]):
         unused += doubted(self.beliefs, state, hold, epoch, unused, moves=motion is Reason.USED)
         gnss = gnss_of(state)
         if gnss.was_used(epoch.time_s):
-            last_fix = state.last_fix if epoch.fix is None else epoch.fix
+            last_fix = state.last_fix if epoch.gnss is None else epoch.gnss
             watch = state.watch.positioned(epoch.time_s)
             state = replace(state, last_fix=last_fix, watch=watch)
-        elif epoch.fix is not None and gnss.rejecting:
+        elif epoch.gnss is not None and gnss.rejecting:
             state = replace(state, watch=state.watch.contradicted())
         if reason not in _TOLD_ELSEWHERE:
             # Of a report without a serving cell, the first one.

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from html import escape
 from math import nan
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
+from mapfilter._same import EqualByContent
 from mapfilter._types import Floats, Ints
 from mapfilter.geodesy import unproject
 from mapfilter.positioning.fingerprints.options import Method, method_name
+from mapfilter.positioning.place_tables import with_points
+
+if TYPE_CHECKING:
+    import geopandas as gpd
 
 LOCATED, NOTHING, UNKNOWN = "", "nothing received", "no transmitter of the database"
 """Why a report has no position; empty where it has one."""
@@ -27,7 +33,7 @@ class Validation:
         What was left out: "logs", or "squares of N m"; or how reports were drawn.
     folds, reports : int
         Times that something was left out, and reports located.
-    mean_m, median_m, error_95_m : float
+    error_mean_m, error_median_m, error_95_m : float
     within_50, within_67, within_95 : float
         Shares of the reports within the radii, each calibrated without its own block.
     """
@@ -36,8 +42,8 @@ class Validation:
     blocks: str
     folds: int
     reports: int
-    mean_m: float
-    median_m: float
+    error_mean_m: float
+    error_median_m: float
     error_95_m: float
     within_50: float
     within_67: float
@@ -45,7 +51,7 @@ class Validation:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LocatedReports:
+class LocatedReports(EqualByContent):
     """Positions of R reports, each from that report alone.
 
     Parameters
@@ -86,6 +92,14 @@ class LocatedReports:
         if scored.size:
             score = f", {scored.mean():.1f} m off on average, median {np.median(scored):.1f} m"
         return f"LocatedReports by {method_name(self.method)}: {located} of {len(self)}{score}"
+
+    def _repr_html_(self) -> str:
+        """Return the summary and the last reports, as notebooks show them."""
+        return f"<p>{escape(repr(self))}</p>{self.to_dataframe().tail().to_html()}"
+
+    def to_geodataframe(self) -> gpd.GeoDataFrame:
+        """Return the same with points in the CRS; reports without a position are left out."""
+        return with_points(self.to_dataframe(), self.crs)
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return one row for each report: position, radii (m), transmitters, reason, error (m)."""

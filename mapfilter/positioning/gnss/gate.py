@@ -130,10 +130,10 @@ class GnssGate:
         """
         state = replace(state, compared_at_s=epoch.time_s, compared_at_m=travelled_m)
         found = GnssComparison(belief, state)
-        if epoch.fix is not None and belief.count:
-            found = self._compare_fix(found, epoch.fix, epoch.time_s, travelled_m)
+        if epoch.gnss is not None and belief.count:
+            found = self._compare_fix(found, epoch.gnss, epoch.time_s, travelled_m)
         by_fix = found.terms
-        if epoch.ranges:
+        if epoch.pseudoranges:
             found = self._compare_ranges(found, epoch, travelled_m, particle_spacing_m)
         if by_fix and found.terms is not by_fix:
             found = _neutral(found)
@@ -208,7 +208,7 @@ class GnssGate:
     ) -> GnssComparison:
         belief, state, options, kind = found.belief, found.state, self.options, "pseudorange"
         if not isinstance(belief, ParticleBelief):
-            missed = [row.satellite for row in epoch.ranges]
+            missed = [row.satellite for row in epoch.pseudoranges]
             return found.without(kind, missed, Reason.NOT_USED_BY_FILTER)
         east, north = belief.state[:2].mean(axis=1, dtype=np.float64).tolist()
         sky, unused = sky_over(options, self.crs, self.origin_m, epoch, (east, north))

@@ -60,8 +60,8 @@ def sky_over(
     """
     unused = list[Unused]()
     chosen: dict[str, Pseudorange] = {}
-    for row in epoch.ranges:
-        if not isfinite(row.range_m):
+    for row in epoch.pseudoranges:
+        if not isfinite(row.pseudorange_m):
             continue
         if row.satellite in chosen:
             unused.append(("pseudorange", row.satellite, Reason.SECOND_READING))
@@ -79,7 +79,7 @@ def sky_over(
         tuple(chosen),
         local,
         seen.elevation_rad,
-        np.array([row.range_m for row in chosen.values()]),
+        np.array([row.pseudorange_m for row in chosen.values()]),
         np.array([row.sigma_m for row in chosen.values()]),
         middle_m,
         frame.true_from_grid,

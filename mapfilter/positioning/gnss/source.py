@@ -76,7 +76,7 @@ class FirstFix(EvidenceSource):
 
     def first(self, epoch: Epoch) -> EvidenceUpdate:
         """Return the fix as it is."""
-        return EvidenceUpdate(None, (FixTerm(epoch.fix, self.origin_m),) if epoch.fix else ())
+        return EvidenceUpdate(None, (FixTerm(epoch.gnss, self.origin_m),) if epoch.gnss else ())
 
     def update(self, state: BayesState, epoch: Epoch, context: Context) -> EvidenceUpdate:  # noqa: ARG002
         """Return nothing."""
@@ -107,7 +107,7 @@ class GnssSource(EvidenceSource):
     def first(self, epoch: Epoch) -> EvidenceUpdate:
         """Return the pseudoranges, with the satellites as they stand over the area's middle."""
         state = GnssState()
-        if not epoch.ranges or "pseudorange" not in self.kinds:
+        if not epoch.pseudoranges or "pseudorange" not in self.kinds:
             return EvidenceUpdate(state)
         options, (width_m, height_m) = self.options, self.area.size_m
         middle_m = (width_m / 2, height_m / 2)
@@ -121,7 +121,7 @@ class GnssSource(EvidenceSource):
         self, belief: MapBelief, epoch: Epoch, travelled_m: float
     ) -> tuple[MapBelief, GnssState]:
         """Give each hypothesis of a belief the clock that the pseudoranges require there."""
-        if not epoch.ranges and epoch.fix is None:
+        if not epoch.pseudoranges and epoch.gnss is None:
             return belief, GnssState()
         found = self.gate.compare(belief, GnssState(), epoch, travelled_m, _FIRST_SPACING_M)
         return found.belief, found.state
@@ -142,7 +142,7 @@ class GnssSource(EvidenceSource):
     def update(self, state: BayesState, epoch: Epoch, context: Context) -> EvidenceUpdate:
         """Compare the epoch's fix and pseudoranges with the belief and the alternative."""
         own = gnss_of(state)
-        if epoch.fix is None and not epoch.ranges:
+        if epoch.gnss is None and not epoch.pseudoranges:
             return EvidenceUpdate(own)
         travelled_m, belief = state.reckoning.travelled_m, state.belief
         due = context.report_due or own.due(self.options, epoch.time_s, travelled_m)
@@ -153,8 +153,8 @@ class GnssSource(EvidenceSource):
             return EvidenceUpdate(own)
         spacing_m = context.particle_spacing_m
         main = self.gate.compare(belief, own, epoch, travelled_m, spacing_m)
-        if epoch.fix is not None and main.compared and not main.state.distrusted:
-            main = main._replace(state=self._followed(main, epoch.fix, epoch.time_s, state))
+        if epoch.gnss is not None and main.compared and not main.state.distrusted:
+            main = main._replace(state=self._followed(main, epoch.gnss, epoch.time_s, state))
         contradiction = None
         if main.state.trail.contradicts:
             contradiction = self._weighted(main.state.trail.contradiction, proven=state.proven)
@@ -185,7 +185,7 @@ class GnssSource(EvidenceSource):
             contradiction=contradiction,
             refuted=(astray and belief.status is Status.SEARCHING)
             # Nothing is left of a grid's belief beyond the area.
-            or (epoch.fix is not None and not belief.count),
+            or (epoch.gnss is not None and not belief.count),
         )
 
     def _weighted(self, found: Contradiction | None, *, proven: bool) -> Contradiction | None:

@@ -162,7 +162,7 @@ class KalmanStep:
 
     def _measure(self, epoch: Epoch, given: SiteReadings) -> Reason:
         self.unused += given.unused
-        fix = epoch.fix
+        fix = epoch.gnss
         if fix is not None and not (isfinite(fix.east_m) and isfinite(fix.north_m)):
             self.unused.append(UnusedReading(epoch.time_s, "gnss", "", Reason.NO_READING))
             fix = None

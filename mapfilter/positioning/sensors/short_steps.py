@@ -56,7 +56,7 @@ class ShortSteps(NamedTuple):
             if waiting is not None and abs(waiting.step_m) >= LEAST_M:
                 moved.append(waiting)
                 waiting = None
-        is_measured = epoch.radio or epoch.fix is not None or epoch.ranges or epoch.differences
+        is_measured = epoch.radio or epoch.gnss is not None or epoch.pseudoranges or epoch.tdoa
         if waiting is not None and is_measured:
             moved.append(waiting)
             waiting = None

@@ -92,11 +92,11 @@ class UndirectedWay(NamedTuple):
         after, steps, given = self, [], epoch.motion
         if not is_measured and not self.is_unmeasured:
             after = self._replace(is_unmeasured=True)
-        ranged = any(isfinite(one.range_m) for one in epoch.ranges)
+        ranged = any(isfinite(one.pseudorange_m) for one in epoch.pseudoranges)
         leg_m = inf
         if by_ways:
             # Near positions what waits would be an error of the position.
-            near = epoch.fix is not None or ranged or self.since_m < _NEAR_POSITION_M
+            near = epoch.gnss is not None or ranged or self.since_m < _NEAR_POSITION_M
             leg_m = 0.0 if near else LEG_M
         for step in given:
             after, one = after._after(step, leg_m)
@@ -109,18 +109,18 @@ class UndirectedWay(NamedTuple):
         if (
             (by_ways and not after.directed)
             or not after.is_blind
-            or (epoch.fix is None and not ranged)
+            or (epoch.gnss is None and not ranged)
         ):
             return after, epoch, []
         # Who comes as far again until the next one had better take this one.
         next_m, after = after.since_m + after.seen_m, after._replace(seen_m=0.0)
-        is_far = after.since_m >= _apart_m(epoch.fix) or next_m > _NEAR_M
+        is_far = after.since_m >= _apart_m(epoch.gnss) or next_m > _NEAR_M
         if is_far or after.is_unmeasured:
             return after, epoch, []
-        left = [("gnss", "")] if epoch.fix is not None else []
-        left += [("pseudorange", one.satellite) for one in epoch.ranges]
+        left = [("gnss", "")] if epoch.gnss is not None else []
+        left += [("pseudorange", one.satellite) for one in epoch.pseudoranges]
         unused = [UnusedReading(epoch.time_s, *one, Reason.NOT_MOVED_ENOUGH) for one in left]
-        return after, replace(epoch, fix=None, ranges=()), unused
+        return after, replace(epoch, gnss=None, pseudoranges=()), unused
 
     def positioned(self) -> UndirectedWay:
         """Return it after a position that was used."""

@@ -137,11 +137,11 @@ def _among_places(
 ) -> tuple[SensorWatch, Carried | None]:
     """Compare a position with those before; return the way that they show beyond the steps."""
     time_s = epoch.time_s
-    if not watch.pace.rows and watch.places.are_left_by(epoch.fix):
+    if not watch.pace.rows and watch.places.are_left_by(epoch.gnss):
         watch = watch._replace(has_motion=False)
     if watch.are_astray:
         return watch, None
-    places = watch.places.after(time_s, epoch.fix, gone_m)
+    places = watch.places.after(time_s, epoch.gnss, gone_m)
     found = places.carried if places is not watch.places else None
     if watch.rest is not None and watch.rest.is_carried and (standing := places.standing):
         # The ride has ended.

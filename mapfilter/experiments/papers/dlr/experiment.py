@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from mapfilter._parallel import ordered_results
+from mapfilter._parallel import SerialExecutor, ordered_results
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.evaluation.track_percentiles import Percentile, percentile_of_tracks
 from mapfilter.experiments.papers.dlr.filters import (
@@ -236,7 +236,8 @@ def run_paper(settings: PaperSettings) -> PaperRun:
     total = trials + DRAWS
     first = None if progress is None else lambda done, _: progress(done, total)
     then = None if progress is None else lambda done, _: progress(trials + done, total)
-    one_track, executor = partial(track_errors, seed=seed), settings.executor
+    one_track = partial(track_errors, seed=seed)
+    executor = settings.executor or SerialExecutor()
     tracks = list(ordered_results(executor, one_track, range(trials), progress=first))
     errors, satellites, gps = (np.array(values) for values in zip(*tracks, strict=True))
     shown = int(np.argmin(np.abs((satellites < FEW).mean(axis=1) - 0.25)))

@@ -14,7 +14,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from mapfilter._parallel import ordered_results
+from mapfilter._parallel import SerialExecutor, ordered_results
 from mapfilter._types import Floats
 from mapfilter.experiments.papers.paper import PaperSettings
 from mapfilter.experiments.papers.tesa.scene import (
@@ -214,7 +214,8 @@ class PaperRun(NamedTuple):
 def run_paper(settings: PaperSettings) -> PaperRun:
     """Run all filters over all trials."""
     one, trials = partial(trial_errors_m, seed=settings.seed), range(settings.trials)
-    found = ordered_results(settings.executor, one, trials, progress=settings.progress)
+    executor = settings.executor or SerialExecutor()
+    found = ordered_results(executor, one, trials, progress=settings.progress)
     errors = np.stack(list(found), axis=1)
     return PaperRun(_scene(False), dict(zip(RUNS, errors, strict=True)))
 

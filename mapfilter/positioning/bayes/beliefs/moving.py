@@ -105,7 +105,7 @@ class _Move:
         cls, beliefs: BeliefFilters, state: BayesState, epoch: Epoch, rng: np.random.Generator
     ) -> _Move:
         """Return the motion of an epoch before its first row."""
-        ranged = any(isfinite(one.range_m) for one in epoch.ranges)
+        ranged = any(isfinite(one.pseudorange_m) for one in epoch.pseudoranges)
         stood_s = epoch.time_s - state.watch.pace.stepped_s
         return cls(
             beliefs=beliefs,
@@ -114,7 +114,7 @@ class _Move:
             rng=rng,
             own=OwnDraws(epoch.time_s),
             ranged=ranged,
-            positioned=epoch.fix is not None or ranged,
+            positioned=epoch.gnss is not None or ranged,
             # Courses along ways count from a heading of 0, those of a compass from its headings.
             by_course=beliefs.followed_ways(state),
             belief=state.belief,

@@ -114,7 +114,7 @@ class TimingSource(EvidenceSource):
         """Return the terms of an epoch, each weighted by the share of its error that is new."""
         unused: list[UnusedReading] = []
         terms: list[TimingTerm | DifferenceTerm] = []
-        if not epoch.differences and not any(isfinite(row.timing_advance) for row in epoch.radio):
+        if not epoch.tdoa and not any(isfinite(row.timing_advance) for row in epoch.radio):
             return EvidenceUpdate(state, unused=unused)
         share = _new_share(travelled_m - state.advance_m, self.options.advance_memory_m)
         if self.advances and share > 0 and self._add_advances(epoch, share, terms, unused):
@@ -166,7 +166,7 @@ class TimingSource(EvidenceSource):
     ) -> list[DifferenceTerm]:
         """Return one term for each reference, as its differences share the reference's error."""
         by_reference: dict[str, dict[str, Difference]] = {}
-        for row in epoch.differences:
+        for row in epoch.tdoa:
             if not isfinite(row.difference_m):
                 continue
             of = by_reference.setdefault(row.reference, {})

@@ -45,12 +45,12 @@ class UsableEpoch(NamedTuple):
 
 def usable_epoch(state: BayesState, given: Epoch, *, by_ways: bool = False) -> UsableEpoch:
     """Return what is usable of an epoch, and the sensors after it."""
-    fix, is_repeated = given.fix, False
+    fix, is_repeated = given.gnss, False
     epoch = given
     if fix is not None:
         is_repeated = fix.repeats(state.last_fix)
         if is_repeated or not (isfinite(fix.east_m) and isfinite(fix.north_m)):
-            epoch = replace(given, fix=None)
+            epoch = replace(given, gnss=None)
     watch, epoch, (motion, radio) = watched(state.watch, epoch, state.hold.step_unit_m)
     measured = motion not in UNMEASURED
     way, epoch, left_out = watch.undirected.spread(epoch, is_measured=measured, by_ways=by_ways)
