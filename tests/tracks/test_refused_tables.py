@@ -50,8 +50,8 @@ def test_other_files_are_named_by_their_suffix(tmp_path, name):
     ("text", "got"),
     [
         (
-            "time,lat,lon\n1,60.1 N,24.9 E\n",
-            "none in 1 row: lat: 1 value is no number, taken as missing (first '60.1 N' in line 2)",
+            "time,lat,lon\n1,60.1 up,24.9 up\n",
+            "none in 1 row: lat: 1 value is no number, taken as missing (first '60.1 up' in line 2)",
         ),
         ("time,lat,lon\n1,,\n2,,\n", "none in 2 rows: no numbers in lat, lon"),
         ("time,lat,lon\n", "no rows"),
@@ -145,3 +145,9 @@ def test_exports_of_other_layouts_are_named_with_the_one_that_is_read(tmp_path, 
 def test_months_in_other_languages_are_named(tmp_path):
     fault = refused(tmp_path, "time,lat,lon\n01-Mai-2026 10:00:00,60,24\n")
     assert fault.hint == "a month that is not named in English; write 2026-05-01T10:00:00"
+
+
+def test_times_that_are_read_are_not_said_to_be_missing(tmp_path):
+    """They were named before what is wrong."""
+    fault = refused(tmp_path, "time,lat,lon\n2026-05-01T10:00:00Z,north,east\n")
+    assert fault.got.startswith("none in 1 row: lat: 1 value is no number")

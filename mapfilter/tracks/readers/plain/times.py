@@ -91,11 +91,12 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
             _check_milliseconds(mapped, reading, number)
         reading.clock = Clock("monotonic", from_midnight=_OF_DAY in reading.notes)
         return over_days(reading, over_weeks(reading, number))
-    reading.notes[:] = [
-        note
-        for note in reading.notes
-        if not (note.startswith(as_numbers) and "taken as missing" in note)
-    ]
+    for remarks in (reading.notes, reading.ignored):
+        remarks[:] = [
+            note
+            for note in remarks
+            if not (note.startswith(as_numbers) and "taken as missing" in note)
+        ]
     names = mapped.names("time")
     # A zone that is given is that of the local times of all files.
     rows, name = mapped.rows, mapped.rows.find(*names) or ""
