@@ -50,8 +50,8 @@ def test_other_files_are_named_by_their_suffix(tmp_path, name):
     ("text", "got"),
     [
         (
-            "time,lat,lon\n1,60.1 up,24.9 up\n",
-            "none in 1 row: lat: 1 value is no number, taken as missing (first '60.1 up' in line 2)",
+            "time,lat,lon\n1,60.1 x,24.9 x\n",
+            "none in 1 row: lat: 1 value is no number, taken as missing (first '60.1 x' in line 2)",
         ),
         ("time,lat,lon\n1,,\n2,,\n", "none in 2 rows: no numbers in lat, lon"),
         ("time,lat,lon\n", "no rows"),
