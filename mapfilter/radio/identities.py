@@ -30,6 +30,9 @@ LIMITS: dict[str, dict[str, int]] = {
 PSC, PCI), areas ``lac`` (LAC, TAC), identities ``ci`` (CI, ECI, NCI) and timing advances.
 """
 
+UNAVAILABLE = (-1, 2**31 - 1, 2**63 - 1)
+"""Numbers by which Android and programs mark what a phone does not know."""
+
 SERVING, NEIGHBOUR = "serving", "neighbour"
 """Roles of reported cells."""
 

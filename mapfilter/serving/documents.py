@@ -10,6 +10,7 @@ from typing import Any
 
 from mapfilter._inputs import is_unicode, json_value, shown
 from mapfilter.errors import Fault, Faults, InputError, fail
+from mapfilter.radio.identities import UNAVAILABLE
 
 BODY = "body"
 """Name of the whole request body in messages."""
@@ -147,7 +148,7 @@ def number(
             found = float("inf")
         if isfinite(found) and low <= found <= high:
             return found
-        faults.add(where, expected, as_json(value), hint)
+        faults.add(where, expected, as_json(value), hint_of_mark(value) or hint)
         return None
     faults.add(where, expected, as_json(value))
     return None
@@ -171,10 +172,16 @@ def whole(
     if isinstance(value, int) and not isinstance(value, bool):
         if low <= value <= high:
             return value
-        faults.add(where, expected, as_json(value), hint)
+        faults.add(where, expected, as_json(value), hint_of_mark(value) or hint)
         return None
     faults.add(where, expected, as_json(value))
     return None
+
+
+def hint_of_mark(value: float) -> str:
+    """Return what a number beyond its range says that is Android's mark; "" for others."""
+    mark = value > 0 and value in UNAVAILABLE
+    return "Android's mark for an unknown value; leave the field out" if mark else ""
 
 
 def text(value: object, where: str, expected: str, faults: Faults, most: int = 128) -> str | None:

@@ -21,6 +21,7 @@ from mapfilter.serving.documents import (
     RequestError,
     as_json,
     check_keys,
+    hint_of_mark,
     number,
     one_fault,
     rows_of,
@@ -198,6 +199,9 @@ def _value(column: Column, value: object, where: str, faults: Faults) -> Any:
         return missing
     if column.kind == "text":
         return text(value, where, column.expected, faults)
+    if isinstance(value, int | float) and (hint := hint_of_mark(value)):
+        faults.add(where, column.expected, shown(value), hint)
+        return missing
     if column.kind == "integer":
         low, high = int(column.low), int(column.high)
         found = whole(value, where, column.expected, faults, low, high, column.hint)

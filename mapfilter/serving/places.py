@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from mapfilter._inputs import shown
 from mapfilter.errors import Faults, InputError
 from mapfilter.geodesy import project
 from mapfilter.lattice import Lattice
@@ -26,6 +27,8 @@ from mapfilter.tracks.joining.position_units import RADIUS_68
 
 _RANGES = {"lat_deg": 90.0, "lon_deg": 180.0, "sd_m": MOST_SD_M}
 _AS_A_PHONE = ("lat_deg", "lon_deg", "accuracy_m")
+_LIKELY = {"lat": "lat_deg", "lon": "lon_deg", "lng": "lon_deg", "acc": "accuracy_m"}
+"""Keys that are meant by others that begin so."""
 _MOST_ACCURACY_M = 1e5
 _MOST_DEG = 180.0
 _FAR_M = 100_000.0
@@ -77,7 +80,10 @@ def in_metres(
         columns of a log, and then returned as it is.
     """
     if not any(key in row for key in _AS_A_PHONE):
-        return row
+        if not row or {"east_m", "north_m"} & row.keys():
+            return row
+        _ask_for_degrees(row, where, faults)
+        return None
     before = len(faults.found)
     check_keys(row, _AS_A_PHONE, where, faults)
     if _is_placeless(row):
@@ -104,6 +110,14 @@ def in_metres(
     variance_m2 = (radius_m / RADIUS_68) ** 2
     both = {"var_east_m2": variance_m2, "var_north_m2": variance_m2, "cov_east_north_m2": 0.0}
     return {**found, **both}
+
+
+def _ask_for_degrees(row: Mapping[str, Any], where: str, faults: Faults) -> None:
+    """Note all keys of a position that has none of those of a place."""
+    expected = f"keys of {', '.join(_AS_A_PHONE)}, or east_m, north_m and their variances"
+    for name in row:
+        begun = (known for begin, known in _LIKELY.items() if name.lower().startswith(begin))
+        faults.add(where, expected, shown(name), next(begun, ""))
 
 
 def placeless_note(document: Mapping[str, Any]) -> tuple[str, ...]:

@@ -131,8 +131,10 @@ def _bounds(radio: pd.DataFrame, found: TableFaults) -> pd.Series:
     level_dbm = radio["level_dbm"].to_numpy(dtype=np.float64, na_value=np.nan)
     unstated = censored.isna().to_numpy()
     of = np.zeros(len(radio), dtype=np.int64)
+    families: list[str] = []
     if "technology" in radio:
-        of, _ = pd.factorize(radio["technology"])
+        of, found_families = pd.factorize(radio["technology"])
+        families = [str(family) for family in found_families]
     for one in np.unique(of):
         some = unstated & (of == one)
         bounds = at_scale_end(np.where(some, level_dbm, np.nan))
@@ -141,7 +143,9 @@ def _bounds(radio: pd.DataFrame, found: TableFaults) -> pd.Series:
         censored = censored.mask(bounds, 1)
         count = number_of(int(bounds.sum()), "level")
         end = f"{level_dbm[bounds][0]:g} dBm, where a scale ends"
-        found.notes.append(f"{found.where}, level_dbm: {count} of {end}: taken for that or more")
+        family = f" of {families[one]}" if one >= 0 and len(families) > 1 else ""
+        text = f"level_dbm{family}: {count} of {end}: taken for that or more"
+        found.notes.append(f"{found.where}, {text}")
     return censored.fillna(0)
 
 

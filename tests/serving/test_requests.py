@@ -167,6 +167,44 @@ def test_values_beyond_their_range_name_the_likely_mistake(cross, body, mistake)
 
 
 @pytest.mark.parametrize(
+    "name", ["mcc", "mnc", "lac", "ci", "arfcn", "bsic", "timing_advance", "level_dbm"]
+)
+@pytest.mark.parametrize("mark", [2**31 - 1, 2**63 - 1, float(2**31 - 1)])
+def test_marks_of_android_for_unknown_values_are_named(cross, name, mark):
+    """An unknown identity was that of a cell which the database lacks."""
+    with pytest.raises(RequestError) as caught:
+        read_epochs(epoch(radio=[{**SERVING, name: mark}]), PlanNames(cross.plan), nan)
+    (fault,) = caught.value.faults
+    assert fault.where.endswith(f".{name}")
+    assert fault.hint == "Android's mark for an unknown value; leave the field out"
+
+
+def test_marks_of_android_in_single_reports_are_named(made):
+    tower = {"mobileCountryCode": 1, "mobileNetworkCode": 1, "cellId": 7}
+    report = {"cellTowers": [{**tower, "timingAdvance": 2**31 - 1, "signalStrength": 2**31 - 1}]}
+    answer = answer_of(made, "POST", "/v1/geolocate", report)
+    assert answer.json["error"]["message"].count("Android's mark for an unknown value") == 2
+
+
+@pytest.mark.parametrize(
+    ("row", "hint"),
+    [
+        ({"lat": 52.0, "lon": 13.0, "accuracy": 12}, "lat_deg"),
+        ({"latitude": 52.0, "longitude": 13.0}, "lat_deg"),
+        ({"lat": 52.0, "lng": 13.0}, "lat_deg"),
+    ],
+)
+def test_positions_by_other_names_are_asked_for_in_degrees(cross, row, hint):
+    """Only metres and their variances were asked for."""
+    with pytest.raises(RequestError) as caught:
+        read_epochs(epoch(gnss=[row]), PlanNames(cross.plan), nan)
+    first, *others = caught.value.faults
+    assert first.hint == hint
+    assert first.expected.startswith("keys of lat_deg, lon_deg, accuracy_m, or east_m, north_m")
+    assert len(others) == len(row) - 1
+
+
+@pytest.mark.parametrize(
     "whole", [{"arfcn": 10, "bsic": 0}, {"timing_advance": 3}, {"censored": -1}], ids=str
 )
 def test_whole_numbers_may_have_a_point(cross, whole):

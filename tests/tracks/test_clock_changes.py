@@ -156,3 +156,13 @@ def test_what_is_no_zone_is_refused(text):
 
 def test_names_are_zones():
     assert str(parse_zone(" Europe/Berlin ")) == BERLIN
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [("Helsinki", "Europe/Helsinki"), ("new york", "America/New_York"), ("Nowhere", "")],
+)
+def test_a_city_alone_names_its_zone(text, hint):
+    with pytest.raises(ConfigError) as error:
+        parse_zone(text)
+    assert error.value.faults[0].hint == hint

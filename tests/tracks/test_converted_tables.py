@@ -20,6 +20,7 @@ ARDUPILOT = {
     "timestamp": TIME_S,
     "TimeUS": 80e6 + 1e6 * np.arange(COUNT),
     "Status": 3,
+    "NSats": 15,
     "GMS": 1000 * (np.arange(COUNT) + 5),
     "GWk": 2416,
     "Lat": LAT,
@@ -70,7 +71,16 @@ WATCH = {
     "record.speed[m/s]": SPEED,
     "record.heart_rate[bpm]": 90,
 }
-TABLES = {"ardupilot": ARDUPILOT, "px4": PX4, "nav-pvt": NAV_PVT, "bag": BAG, "watch": WATCH}
+ARDUPILOT_OF_WEEKS = {name: ARDUPILOT[name] for name in ARDUPILOT if name != "timestamp"}
+ARDUPILOT_OF_WEEKS["GMS"] = (1000 * (TIME_S + 18 - 315_964_800 - 2416 * 604_800)).astype(int)
+TABLES = {
+    "weeks": ARDUPILOT_OF_WEEKS,
+    "ardupilot": ARDUPILOT,
+    "px4": PX4,
+    "nav-pvt": NAV_PVT,
+    "bag": BAG,
+    "watch": WATCH,
+}
 
 
 def read(tmp_path, columns, **own):
@@ -84,14 +94,14 @@ def test_positions_are_read_by_the_names_of_the_program(tmp_path, program):
     """They were refused, or lost their speeds."""
     found = read(tmp_path, TABLES[program])
     places = found.tables["positions"]
-    assert found.clock.kind == "utc"
+    assert found.clock.kind == ("gps" if program == "weeks" else "utc")
     np.testing.assert_allclose(places["time_s"], TIME_S, atol=1e-3)
     np.testing.assert_allclose(places["lat_deg"], LAT, atol=2e-7)
     np.testing.assert_allclose(places["lon_deg"], LON, atol=2e-7)
     np.testing.assert_allclose(places["altitude_m"], 16.0)
     if program != "bag":
         np.testing.assert_allclose(places["speed_mps"], SPEED, atol=1e-3)
-    if program in ("ardupilot", "nav-pvt"):
+    if program in ("weeks", "ardupilot", "nav-pvt"):
         np.testing.assert_allclose(places["course_deg"], COURSE)
     if program in ("px4", "nav-pvt"):
         np.testing.assert_allclose(places["accuracy_m"], 1.2)
@@ -173,6 +183,7 @@ JAMMED = np.arange(COUNT) >= COUNT // 2
         ({"time": TIME_S, "latitude": LAT, "longitude": LON}, "fix_type", 1, 0),
         ({"time": TIME_S, "latitude": LAT, "longitude": LON}, "fix", "3D", "NO_FIX"),
         ({"time": TIME_S, "latitude": LAT, "longitude": LON}, "fix_quality", 1, 0),
+        ({"time": TIME_S, "latitude": LAT, "longitude": LON}, "Valid", "TRUE", "FALSE"),
     ],
 )
 def test_positions_that_a_receiver_states_to_be_none_are_left_out(
@@ -201,3 +212,21 @@ def test_motion_in_rows_without_a_fix_counts(tmp_path):
     found = read(tmp_path, {**table, "fix_type": np.where(JAMMED, 0, 3)})
     assert len(found.tables["odometry"]) == COUNT
     assert len(found.tables["positions"]) == (~JAMMED).sum()
+
+
+@pytest.mark.parametrize(
+    ("lat", "lon", "sign"),
+    [("{:.6f}°", "{:.6f} °", 1), ("{:.6f} N", "{:.6f}E", 1), ("{:.6f}° S", "{:.6f}W", -1)],
+)
+def test_degrees_with_their_sign_or_hemisphere_are_read(tmp_path, lat, lon, sign):
+    """They were no numbers."""
+    columns = {"time": TIME_S, "lat": map(lat.format, LAT), "lon": map(lon.format, LON)}
+    places = read(tmp_path, columns).tables["positions"]
+    np.testing.assert_allclose(places["lat_deg"], sign * LAT, atol=1e-6)
+    np.testing.assert_allclose(places["lon_deg"], sign * LON, atol=1e-6)
+
+
+def test_letters_of_the_other_axis_are_no_degrees(tmp_path):
+    columns = {"time": TIME_S, "lat": [f"{one} E" for one in LAT], "lon": LON}
+    with pytest.raises(InputError, match="lat: 40 values are no numbers"):
+        read(tmp_path, columns)

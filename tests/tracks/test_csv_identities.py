@@ -286,3 +286,21 @@ def test_a_cell_of_number_zero_in_a_network_is_one(read):
     radio, _ = read(mcc=244, mnc=91, lac=171, ci=0)
     assert set(radio["cell"]) == {"244-91-171-0"}
     assert set(radio["role"]) == {"serving"}
+
+
+@pytest.mark.parametrize("node", [True, False])
+def test_numbers_of_cells_within_nodes_beside_whole_identities_are_no_names(read, node):
+    """All cells with the same number were one, which a plan of numbered cells has as another."""
+    nodes, cells = numbers(1000, 9000), numbers(1, 4, 2)
+    columns = {"eci": 256 * nodes + cells, "cell": cells} | ({"enb": nodes} if node else {})
+    radio, notes = read(mcc=244, mnc=91, tac=7, **columns)
+    assert radio["cell"].tolist() == [
+        f"244-91-7-{256 * a + b}" for a, b in zip(nodes, cells, strict=True)
+    ]
+    assert "cell: taken for the numbers of cells within their nodes" in notes
+
+
+def test_small_names_of_a_plan_beside_other_identities_stay(read):
+    names = numbers(1, 40)
+    radio, _ = read(mcc=244, mnc=91, lac=7, ci=10_000 + 2 * names, cell=names)
+    assert radio["cell"].tolist() == [str(one) for one in names]

@@ -73,3 +73,23 @@ def test_a_log_of_tables_notes_it_too():
 )
 def test_few_times_and_times_with_fractions_are_not_cut(time_s):
     assert cut_times(np.asarray(time_s, dtype=float)) == ""
+
+
+def test_fixes_of_several_providers_at_one_second_are_not_cut(tmp_path):
+    """As of a phone whose fused, satellite and network positions have the same times."""
+    providers = (("FLP", 3), ("GPS", 5), ("NLP", 400))
+    fixes = [
+        f"Fix,{name},60.17{error_m},{24.9 + 1e-5 * second:.6f},20.0,1.0,{error_m},{1000 * time}"
+        for second, time in enumerate(range(START_UTC_S, START_UTC_S + 100))
+        for name, error_m in providers
+    ]
+    header = "# Fix,Provider,Latitude,Longitude,Altitude,Speed,Accuracy,(UTC)TimeInMs"
+    path = tmp_path / "gnss_log.txt"
+    path.write_text("\n".join([header, *fixes]) + "\n")
+    recording = read_recording(path)
+    assert len(recording.tables["positions"]) == 300
+    assert not [note for note in recording.ignored if CAUSE in note]
+    thrice = [line for line in fixes if "GPS" in line for _ in range(3)]
+    changed = [line.replace("20.0", f"2{k % 3}.0") for k, line in enumerate(thrice)]
+    path.write_text("\n".join([header, *changed, *fixes]) + "\n")
+    assert [note for note in read_recording(path).ignored if CAUSE in note]

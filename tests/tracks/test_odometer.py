@@ -135,5 +135,6 @@ def test_a_counter_without_a_unit_or_of_unknown_meaning_is_named(column, tmp_pat
     pd.DataFrame(columns).to_csv(path, index=False)
     (text,) = [n for n in read_recording(path, options=ReadOptions()).notes if "not used" in n]
     assert "odometer_m" in text
-    with pytest.raises(InputError, match="yaw rates without speeds or an odometer"):
+    with pytest.raises(InputError, match="yaw rates without speeds or an odometer") as error:
         mf.read_log(path)
+    assert f"one of the columns not used ({column.lower()} (" in error.value.faults[0].hint

@@ -50,8 +50,8 @@ def test_other_files_are_named_by_their_suffix(tmp_path, name):
     ("text", "got"),
     [
         (
-            "time,lat,lon\n1,60.1 N,24.9 E\n",
-            "none in 1 row: lat: 1 value is no number, taken as missing (first '60.1 N' in line 2)",
+            "time,lat,lon\n1,60.1 x,24.9 x\n",
+            "none in 1 row: lat: 1 value is no number, taken as missing (first '60.1 x' in line 2)",
         ),
         ("time,lat,lon\n1,,\n2,,\n", "none in 2 rows: no numbers in lat, lon"),
         ("time,lat,lon\n", "no rows"),
@@ -89,3 +89,65 @@ def test_decimal_commas_within_quotes_are_read(tmp_path):
     assert places["lon_deg"].tolist() == [24.9412, 25.0]
     # Which comma parts thousands is not known.
     assert pd.isna(places["altitude_m"].iloc[0])
+
+
+@pytest.mark.parametrize(
+    ("header", "such"),
+    [
+        ("position.latitude,position.longitude,updateTime", "lat_deg=position.latitude"),
+        ("CUSTOM.updateTime [local],OSD.latitude,OSD.longitude", "lon_deg=osd.longitude"),
+        ("position_lat,position_long,when", "lat_deg=position_lat"),
+        ("Time since start of day (seconds),a,b", "'time=time since start of day (seconds)'"),
+        (
+            "CUSTOM.updateTime [local],OSD.latitude,OSD.longitude",
+            "'time=custom.updatetime [local]'",
+        ),
+        ("stamp_time,message.twist.speed [m/s],a", "'wheel_speed_mps=message.twist.speed [m/s]'"),
+    ],
+)
+def test_columns_whose_names_only_end_in_a_usual_one_are_proposed(tmp_path, header, such):
+    """Placeholders stood in their place."""
+    fault = refused(tmp_path, f"{header}\n1,2,3\n")
+    assert such in fault.hint
+    assert "LATITUDE" not in fault.hint or "lat_deg" not in such
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "hint"),
+    [
+        ("drive.pos", "% program   : RTKPOST ver.2.4.3\n% GPST  latitude(deg)\n", "RTKLIB"),
+        (
+            "walk.csv",
+            "Type,Local Number,Message,Field 1,Value 1,Units 1\nData,0,record,timestamp,1,s\n",
+            "all messages of a FIT file; export GPX, or its records alone (FitCSVTool --data",
+        ),
+        (
+            "bus.csv",
+            "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3\n1,7E8,false,Rx,0,3,03,41,0D\n",
+            "raw frames of a bus",
+        ),
+        (
+            "flight.txt",
+            "2026-05-01 10:00:00.00: GPS {TimeUS : 80221069, Status : 3, Lat : 42.3, Lng : 7.1}\n",
+            "mavlogdump.py --format csv",
+        ),
+        (
+            "flight.csv",
+            "5/1/2026 12:37:41 PM,FE,1E,13,mavlink_gps_raw_int_t,time_usec,306016000,lat,4\n",
+            "mavlogdump.py --format csv",
+        ),
+    ],
+)
+def test_exports_of_other_layouts_are_named_with_the_one_that_is_read(tmp_path, name, text, hint):
+    assert hint in refused(tmp_path, text, name).hint
+
+
+def test_months_in_other_languages_are_named(tmp_path):
+    fault = refused(tmp_path, "time,lat,lon\n01-Mai-2026 10:00:00,60,24\n")
+    assert fault.hint == "a month that is not named in English; write 2026-05-01T10:00:00"
+
+
+def test_times_that_are_read_are_not_said_to_be_missing(tmp_path):
+    """They were named before what is wrong."""
+    fault = refused(tmp_path, "time,lat,lon\n2026-05-01T10:00:00Z,north,east\n")
+    assert fault.got.startswith("none in 1 row: lat: 1 value is no number")

@@ -93,6 +93,19 @@ def test_what_a_log_states_is_left_and_noted_once(tmp_path):
     assert again.radio["censored"].tolist() == log.radio["censored"].tolist()
 
 
+def test_notes_on_several_technologies_name_them():
+    """Two notes gave different numbers of the same levels."""
+    level_dbm = by_modem(walked())
+    families = np.where(np.arange(len(level_dbm)) < 2500, "GSM", "UMTS")
+    log = make_log(CRS, radio=heard(level_dbm, technology=families))
+    ends = [int(np.sum(level_dbm[families == one] == -51.0)) for one in ("GSM", "UMTS")]
+    assert log.notes == tuple(
+        f"radio, level_dbm of {family}: {count} levels of -51 dBm, where a scale ends: taken for "
+        "that or more"
+        for family, count in zip(("GSM", "UMTS"), ends, strict=True)
+    )
+
+
 def test_each_technology_has_its_own_end():
     """An LTE level beyond -51 dBm says nothing of the GSM phone beside it."""
     gsm, lte = by_modem(walked()), np.round(walked(strongest_dbm=-45.0))

@@ -52,6 +52,19 @@ def test_the_first_report_is_shown_when_one_steps_to_it():
     assert "Runner-up" in after
 
 
+def test_times_of_a_session_that_are_dates_are_shown_as_dates():
+    """They were seconds since 1970. A device's clock may count from its own start as well."""
+    found = ran("return [1777629700.2, 95, null, -1].map(MF.moment);")
+    assert found == ["2026-05-01 10:01:40 UTC", "95\u202fs", "–", "−1\u202fs"]
+
+
+@pytest.mark.parametrize(("start_s", "shown"), [(0, ""), (1_777_629_700, " · 10:01:42 UTC")])
+def test_the_page_of_a_session_shows_the_time_of_day(start_s, shown):
+    live = LIVE.replace("time_s: 10 + number", f"time_s: {start_s} + number")
+    task = 'fix(1, "SEARCHING"); fix(2, "LOST"); return MF.byId("transport").textContent;'
+    assert ran(live + task, bundle=live_bundle()).endswith(f"0:01 / 0:01{shown}")
+
+
 def test_the_first_fix_is_shown_and_what_replaces_it():
     task = """const found = [side()]; fix(1, "SEARCHING"); found.push(side());
     fix(1, "LOST"); found.push(side()); return found;"""

@@ -276,8 +276,20 @@ def test_a_folder_is_all_recordings_in_it(made, tmp_path):
     assert any("Annotation.csv, Metadata.csv left out" in note for note in result.notes)
     assert any("AccelerometerUncalibrated.csv: accelerometer not used" in n for n in result.notes)
     (tmp_path / "none").mkdir()
-    with pytest.raises(InputError, match="none in a known format"):
+    with pytest.raises(InputError, match="none in a known format") as error:
         converted([tmp_path / "none"], tmp_path / "other")
+    assert not error.value.faults[0].hint
+
+
+def test_a_folder_of_exported_folders_names_them(tmp_path):
+    (tmp_path / "exports" / "2026-05-01").mkdir(parents=True)
+    (tmp_path / "exports" / "empty").mkdir()
+    walk = "time,latitude,longitude\n1777629600,60.1,24.9\n1777629601,60.1,24.9\n"
+    (tmp_path / "exports" / "2026-05-01" / "walk.csv").write_text(walk)
+    with pytest.raises(InputError, match="none in a known format") as error:
+        converted([tmp_path / "exports"], tmp_path / "log")
+    named = f"name {tmp_path / 'exports' / '2026-05-01'}"
+    assert error.value.faults[0].hint == f"they are in folders in it, each of a journey: {named}"
 
 
 def test_parts_of_one_sensor_are_joined(made, tmp_path):

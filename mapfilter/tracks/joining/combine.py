@@ -11,7 +11,7 @@ import pandas as pd
 
 from mapfilter._words import number_of
 from mapfilter.angles import heading_from_azimuth_rad
-from mapfilter.errors import InputError, MapfilterError, fail
+from mapfilter.errors import InputError, MapfilterError, fail, listed
 from mapfilter.tracks.checks.beyond_crs import within_crs
 from mapfilter.tracks.checks.far_apart import check_far_apart
 from mapfilter.tracks.checks.mirrored import mirrored_notes
@@ -184,7 +184,9 @@ def _nothing_found(recordings: Sequence[Recording], journey: Sequence[Recording]
     odometry = [r.tables["odometry"] for r in journey if "odometry" in r.tables]
     turns = any(rows["yaw_rate_radps"].notna().any() for rows in odometry)
     got = "yaw rates without speeds or an odometer" if turns else "none"
-    return fail(InputError, names, "rows of a journey", got)
+    unread = [column for recording in recordings for column in recording.unread]
+    hint = f"one of the columns not used ({listed(unread)}); name it by --column" if unread else ""
+    return fail(InputError, names, "rows of a journey", got, hint)
 
 
 def _joined(recordings: Sequence[Recording], table: str) -> pd.DataFrame | None:

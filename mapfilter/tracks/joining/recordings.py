@@ -83,6 +83,12 @@ def with_remarks(log: TrackLog, notes: Sequence[str], recordings: Sequence[Recor
     return replace(log, notes=tuple(dict.fromkeys((*notes, *of_files, *log.notes))))
 
 
+def _folders_with_recordings(path: Path) -> list[str]:
+    """Return the folders within one that hold recordings, as an app exports one for each."""
+    folders = (one for one in sorted(path.iterdir()) if one.is_dir() and one.name[0] != ".")
+    return [str(one) for one in folders if any(format_of(file) for file in files_in(one))]
+
+
 def _expanded(paths: Sequence[Path]) -> tuple[list[Path], tuple[str, ...]]:
     """Return files, and of folders and ZIPs the recordings in them; notes name other files."""
     found: list[Path] = []
@@ -106,6 +112,8 @@ def _expanded(paths: Sequence[Path]) -> tuple[list[Path], tuple[str, ...]]:
             logs = [p.name for p in sorted(path.iterdir()) if is_log(p)] if is_folder else []
             got = "track logs" if logs else "none in a known format"
             hint = f"name one of them: {listed(logs)}" if logs else ""
+            if is_folder and not logs and (inside := _folders_with_recordings(path)):
+                hint = f"they are in folders in it, each of a journey: name {listed(inside)}"
             raise fail(InputError, str(path), expected, got, hint)
         others = [p.name for p in inner if p not in known]
         if others:

@@ -25,7 +25,12 @@ from mapfilter.tracks.readers.plain.mapped import (
     mapped_columns,
 )
 from mapfilter.tracks.readers.plain.odometry import add_odometry, add_turns
-from mapfilter.tracks.readers.plain.places import add_places, hemisphere_columns
+from mapfilter.tracks.readers.plain.places import (
+    add_places,
+    hemisphere_columns,
+    with_bare_degrees,
+)
+from mapfilter.tracks.readers.plain.set_back import with_clock_set_right
 from mapfilter.tracks.readers.plain.steps import add_steps, are_counted
 from mapfilter.tracks.readers.plain.technology import with_technologies
 from mapfilter.tracks.readers.plain.times import times_of
@@ -96,7 +101,8 @@ def read_columns(rows: Columns, reading: Reading, options: ReadOptions) -> None:
         A field or column that does not exist, a unit of another quantity in a name, no times.
     """
     rows = with_full_names(rows, {name.lower() for name in options.columns.values()})
-    mapped = with_dates(with_technologies(mapped_columns(rows, reading, options), reading))
+    mapped = with_bare_degrees(mapped_columns(rows, reading, options))
+    mapped = with_dates(with_technologies(mapped, reading))
     rows = mapped.rows
     hemispheres = hemisphere_columns(rows, mapped.taken)
     week = week_column(mapped)
@@ -109,7 +115,7 @@ def read_columns(rows: Columns, reading: Reading, options: ReadOptions) -> None:
     reading.tallies.columns |= {
         field: column for field in _VITAL if (column := rows.find(*mapped.names(field))) is not None
     }
-    time_s = times_of(mapped, reading, options)
+    time_s = with_clock_set_right(times_of(mapped, reading, options), rows.line, reading)
     reading.columns |= mapped.stated
     reading.columns |= {field: name.lower() for field, name in mapped.own.items()}
     reading.last_s = max([reading.last_s, *time_s[np.isfinite(time_s)][-1:].tolist()])

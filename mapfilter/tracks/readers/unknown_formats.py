@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 import shlex
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -30,6 +31,22 @@ _FIELD_OF_UNIT = {
     "dbm": "level_dbm",
 }
 """Fields that a column whose name is of another language may be, by its unit."""
+_ENDS = {
+    "lat_deg": re.compile(r".*[._ :/](?:lat|latitude)"),
+    "lon_deg": re.compile(r".*[._ :/](?:lon|long|lng|longitude)"),
+    "time": re.compile(r".*time.*"),
+}
+"""Names of columns that only end in a usual name of a field, or hold it."""
+_MESSAGES = "messages of an autopilot; export one kind: mavlogdump.py --format csv --types GPS"
+_LAYOUTS = (
+    (
+        re.compile(r"type,\s*local number,\s*message,", re.IGNORECASE),
+        "all messages of a FIT file; export GPX, or its records alone (FitCSVTool --data record)",
+    ),
+    (re.compile(r".*,mavlink_\w+_t,", re.IGNORECASE), _MESSAGES),
+    (re.compile(r"\d{4}-\d\d-\d\d [\d:.]+: \w+ \{TimeUS : "), _MESSAGES),
+)
+"""First lines of exports whose columns are no quantities, and what to do."""
 RAW_FRAMES = "raw frames of a bus; decode them by its DBC (cantools), export signals as CSV"
 NOT_READ = {
     ".nmf": "a Nemo log that is no text of Nemo file format 2; export it as CSV, map the columns",
@@ -51,6 +68,7 @@ NOT_READ = {
     ".tcx": "a TCX file; export GPX",
     ".igc": "an IGC file; export GPX",
     ".gpkg": "a GeoPackage; export its tables as CSV",
+    ".pos": "a solution of RTKLIB; export NMEA, or a table with one line of names as CSV",
     ".ubx": "binary messages of a u-blox receiver; export NMEA, or RINEX",
     ".xlsx": "a spreadsheet; export it as CSV",
     ".xls": "a spreadsheet; export it as CSV",
@@ -79,13 +97,15 @@ def unknown_format(
     separator = likely_separator(text.first_line)
     names = header_names(text.first_line, separator)
     is_table = len(names) > 1 and not text.first_line.lstrip().startswith(("{", "[", "<"))
-    hint = NOT_READ.get(path.suffix.lower(), "") or _other_separators(path, text, find_format)
+    known = (hint for layout, hint in _LAYOUTS if layout.match(text.first_line))
+    hint = NOT_READ.get(path.suffix.lower(), "") or next(known, "")
+    hint = hint or _other_separators(path, text, find_format)
     if text.first_line.lstrip().startswith(JSON):
         hint = hint or NOT_READ[".json"]
     if is_table and not hint and _is_plan(names):
         hint = "a list of cells, no journey: name it as [cells] plan"
     if is_table and not hint:
-        raw = {"databytes", "data bytes", "dlc"} & set(names)
+        raw = {"databytes", "data bytes", "dlc"} & set(names) or {"id", "d1", "d2"} <= set(names)
         hint = RAW_FRAMES if raw else other_names(names)
     got = f"none of them; it begins with {text.first_line[:60]!r}"
     if is_table:
@@ -123,12 +143,18 @@ def other_names(names: Sequence[str]) -> str:
         for name in others
         if name not in likely and (unit := parted_unit(name)[1]) in _FIELD_OF_UNIT
     ]
+    ended = {
+        field: next((name for name in others if end.fullmatch(parted_unit(name)[0])), "")
+        for field, end in _ENDS.items()
+        if field not in found and not any(field in fields for fields in likely.values())
+    }
+    such += [shlex.quote(f"{field}={name}") for field, name in ended.items() if name]
     if not such and not {"lat_deg", "lon_deg"} <= found:
         such = ["lat_deg=LATITUDE", "lon_deg=LONGITUDE"]
     times = ""
     if "time" not in found:
         times = "a CSV without a column of times; "
-        such += [] if any("time" in fields for fields in likely.values()) else ["time=COLUMN"]
+        such += [] if "time" not in ended or ended["time"] else ["time=COLUMN"]
     option = (
         f"--column FIELD=COLUMN (track.columns in a configuration), such as {' and '.join(such)}"
     )

@@ -35,6 +35,10 @@
     const s = (digits ? (all % 60).toFixed(digits) : String(Math.floor(all % 60))).padStart(digits ? 3 + digits : 2, "0");
     return sign + (h ? `${h}:${String(m).padStart(2, "0")}:${s}` : `${m}:${s}`);
   };
+  // Times of a device, which may count from any start: those of 1973 to 2099 are dates.
+  MF.isDate = (seconds) => seconds >= 1e8 && seconds < 4.1e9;
+  MF.moment = (seconds) => (MF.isDate(seconds) ? `${new Date(1000 * seconds).toISOString().slice(0, 19).replace("T", " ")} UTC`
+    : MF.number(seconds ?? NaN, 0, "s"));
   // A ratio of likelihoods in words; nats are its logarithm.
   MF.times = (nats) => {
     const ratio = Math.exp(Math.abs(nats));

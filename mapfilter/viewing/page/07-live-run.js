@@ -20,6 +20,7 @@
       run.count = epochs.time.length;
       run.start = epochs.time[0] ?? 0;
       run.end = epochs.time[run.count - 1] ?? 0;
+      run.data.start_utc_s = MF.isDate(run.start) ? 0 : null;
       run.last = epochs.number[run.count - 1] ?? run.last;
       run.belief = frames.length ? frames : null;
       run.explained = reasons.length ? { epoch: { raw: reasons.map((one) => one.epoch) }, ...Object.fromEntries(["lead_sum", "runner_sum", "alt_sum", "runner_prior"]

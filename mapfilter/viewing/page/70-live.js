@@ -57,7 +57,7 @@
   };
 
   const sessionRow = (one) => MF.h("tr", {}, MF.h("td", {}, MF.h("a", { href: `${encodeURIComponent(one.id)}${window.location.search}` }, one.name || one.id)),
-    MF.h("td", {}, one.epochs), MF.h("td", {}, MF.number(one.time_s ?? NaN, 0, "s")), MF.h("td", {}, new Date(1000 * one.began_utc_s).toISOString().slice(0, 19).replace("T", " ")));
+    MF.h("td", {}, one.epochs), MF.h("td", {}, MF.moment(one.time_s)), MF.h("td", {}, new Date(1000 * one.began_utc_s).toISOString().slice(0, 19).replace("T", " ")));
   const showSessions = async () => {
     const body = MF.h("div", {});
     MF.byId("title").textContent = document.title = "Sessions";

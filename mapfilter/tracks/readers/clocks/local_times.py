@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from datetime import UTC, datetime, timedelta, timezone, tzinfo
 from math import isfinite, nan
-from zoneinfo import ZoneInfo
+from zoneinfo import ZoneInfo, available_timezones
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -220,4 +220,10 @@ def parse_zone(zone: str) -> tzinfo:
         return ZoneInfo(zone.strip())
     except (ValueError, OSError, LookupError) as error:
         expected = "a zone such as Europe/Brussels or +01:00"
-        raise fail(ConfigError, "--zone", expected, repr(zone)) from error
+        raise fail(ConfigError, "--zone", expected, repr(zone), _zone_of(zone)) from error
+
+
+def _zone_of(city: str) -> str:
+    """Return the zone that is named after a city; "" without one."""
+    end = f"/{city.strip().lower().replace(' ', '_')}"
+    return next((name for name in sorted(available_timezones()) if name.lower().endswith(end)), "")

@@ -27,17 +27,21 @@ class _Program:
         Names that tell such a table.
     meant : mapping of str to str
         Names in words, by those of the program.
+    lacks : str
+        A name that such a table does not have; "" for none.
     """
 
     note: str
     marks: frozenset[str]
     meant: Mapping[str, str]
+    lacks: str = ""
 
 
 def _axes(sensor: str, of: str) -> dict[str, str]:
     return {f"field.{of}.{axis}": f"{sensor}_{axis}" for axis in "xyz"}
 
 
+_ARDUPILOT = {"alt": "altitude [m]", "spd": "speed [m/s]", "gcrs": "course [deg]"}
 _FORCES = ("gfx", "gfy", "gfz")
 _PROGRAMS = (
     # Forces in g, the magnetic field in µT, the pressure in hPa.
@@ -85,10 +89,17 @@ _PROGRAMS = (
             "vel_m_s": "speed [m/s]",
         },
     ),
+    # Without times that a converter adds those of the GPS week count.
+    _Program(
+        "columns as of positions of ArduPilot",
+        frozenset(("timeus", "gms", "gwk", "lat", "lng")),
+        {"gms": "tow [ms]", "gwk": "week", **_ARDUPILOT},
+        lacks="timestamp",
+    ),
     _Program(
         "columns as of positions of ArduPilot",
         frozenset(("timeus", "gms", "lat", "lng")),
-        {"alt": "altitude [m]", "spd": "speed [m/s]", "gcrs": "course [deg]"},
+        _ARDUPILOT,
     ),
     _Program(
         "columns as of NAV-PVT of u-blox (mm, mm/s)",
@@ -158,7 +169,8 @@ def with_full_names(rows: Columns, own: Collection[str]) -> Columns:
 
 
 def _program(names: Sequence[str]) -> _Program | None:
-    return next((one for one in _PROGRAMS if one.marks <= set(names)), None)
+    found = (one for one in _PROGRAMS if one.marks <= set(names) and one.lacks not in names)
+    return next(found, None)
 
 
 def _texts(numbers: np.ndarray) -> np.ndarray:

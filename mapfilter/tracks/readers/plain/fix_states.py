@@ -12,10 +12,10 @@ _TYPES = ("fix_type", "fixtype", "fix type", "gps_fix_type", "gnss_fix_type", "g
 """Kinds of fixes: 0 and 1 for none, 2 and more for others; or 0 for none and 1 for one."""
 _QUALITIES = ("fix_quality", "gps_quality", "gga_quality", "fix quality")
 """As in GGA of NMEA: 0 for none, 6 to 8 for positions that are not measured."""
-_FLAGS = ("gnssfixok", "gnss_fix_ok", "fix_ok", "fix_valid", "gps_valid", "gnss_valid")
+_FLAGS = ("gnssfixok", "gnss_fix_ok", "fix_ok", "fix_valid", "gps_valid", "gnss_valid", "valid")
 _OF_BAGS = ("field.status.status", "status.status")
 """As in NavSatStatus of ROS: -1 for none."""
-_ARDUPILOT = {"timeus", "gms", "status"}
+_ARDUPILOT = {"timeus", "nsats", "status"}
 _NONE = frozenset(("no_fix", "no fix", "nofix", "none", "no gps", "no_gps", "invalid", "no"))
 _FALSE = frozenset(("0", "false", "no", "n", "v", "invalid"))
 _LEAST_OF_TYPES, _ESTIMATED = 2, (6, 7, 8)

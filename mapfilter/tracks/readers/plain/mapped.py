@@ -11,6 +11,7 @@ import numpy as np
 from mapfilter._header_units import HeaderUnit, header_unit
 from mapfilter._types import Floats
 from mapfilter.errors import Faults, InputError
+from mapfilter.radio.transmitter_lists import CELLS_OF_NODE
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.plain.fields import FIELDS, check_fields
 from mapfilter.tracks.readers.plain.headers import stated_fields
@@ -238,16 +239,23 @@ def _with_signals(mapped: Mapped, reading: Reading) -> Mapped:
 
 
 def _with_sectors(mapped: Mapped, reading: Reading) -> Mapped:
-    """Return columns with small numbers of cells beside those of nodes as cells of these."""
+    """Return columns with small numbers of cells beside those of nodes as cells of these.
+
+    Beside whole identities they are what these end in.
+    """
     name = "cell"
-    others = any(map(mapped.has, ("sector", "ci")))
-    if mapped.rows.names.count(name) != 1 or not mapped.has("enodeb") or others:
-        return mapped
-    if name in {column.lower() for column in mapped.own.values()}:
+    owned = name in {column.lower() for column in mapped.own.values()}
+    beside = mapped.has("enodeb") or mapped.has("ci")
+    if mapped.rows.names.count(name) != 1 or owned or not beside or mapped.has("sector"):
         return mapped
     texts = mapped.rows.texts(name)
     known = np.unique(texts[~mapped.rows.flags(name, true=MISSING)])
     small = known.size and all(_OF_NODE.fullmatch(str(text)) for text in known)
+    if small and mapped.has("ci"):
+        whole, (number, there) = mapped.whole("ci"), mapped.rows.whole(name)
+        known_both = there & (whole >= CELLS_OF_NODE)
+        same = np.mod(whole[known_both], CELLS_OF_NODE) == number[known_both]
+        small = same.size and same.mean() > _MOSTLY
     if not (small or reading.columns.get("sector") == name):
         return mapped
     reading.note(f"{name}: taken for the numbers of cells within their nodes")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +23,8 @@ _NAMED = re.compile(
     r"(?:gps)?[ _]?(?:lat|latitude|lon|long|lng|longitude)[ /_]?"
     r"(?:(?:dir|hemi|ind|ref)\w*|n[ /_]?s|e[ /_]?w)|hemi\w*|n[ /_]?s|e[ /_]?w"
 )
+_MARKED = re.compile(r"([-+]?\d+(?:[.,]\d+)?)\s*(°?)\s*([NSEW]?)", re.ASCII | re.IGNORECASE)
+"""Degrees with their sign or the letter of their hemisphere."""
 _MISSING_WORD = re.compile(r"\D{2,}")
 _FAR_DEG = 1.0
 """Farther from the equator and the meridian of Greenwich, none crosses them to the next row."""
@@ -57,6 +60,22 @@ def hemisphere_columns(rows: Columns, taken: frozenset[str] = frozenset()) -> di
             if field not in found and texts and texts.issubset(letters):
                 found[field] = name
     return found
+
+
+def with_bare_degrees(mapped: Mapped) -> Mapped:
+    """Return columns whose degrees are numbers, where they have a sign or a letter: 60.17° N."""
+    rows = mapped.rows
+    for field, (plus, minus) in _HEMISPHERES.items():
+        name = rows.find(*mapped.names(field))
+        found = name and _MARKED.fullmatch(rows.first_text(name))
+        if not name or not found or not (found[2] or found[3]):
+            continue
+        for letter, sign in ((minus, "-"), (f"{plus}?", "")):
+            either = f"[{letter[0]}{letter[0].lower()}]{letter[1:]}"
+            pattern = rf"^\s*([-+]?\d+(?:[.,]\d+)?)\s*°?\s*{either}\s*$"
+            rows = rows.rewritten(pattern, rf"{sign}\1", name)
+        rows.reading.note(f"{name}: degrees with a sign or a letter, as in {found[0]}")
+    return replace(mapped, rows=rows)
 
 
 def add_places(

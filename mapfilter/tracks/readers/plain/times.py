@@ -91,11 +91,12 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
             _check_milliseconds(mapped, reading, number)
         reading.clock = Clock("monotonic", from_midnight=_OF_DAY in reading.notes)
         return over_days(reading, over_weeks(reading, number))
-    reading.notes[:] = [
-        note
-        for note in reading.notes
-        if not (note.startswith(as_numbers) and "taken as missing" in note)
-    ]
+    for remarks in (reading.notes, reading.ignored):
+        remarks[:] = [
+            note
+            for note in remarks
+            if not (note.startswith(as_numbers) and "taken as missing" in note)
+        ]
     names = mapped.names("time")
     # A zone that is given is that of the local times of all files.
     rows, name = mapped.rows, mapped.rows.find(*names) or ""
@@ -286,6 +287,8 @@ def _of_time(text: str) -> str:
         return "a wrong year; times of 1980 to 2099 are read"
     if re.match(r"\d{1,2}[-/]\d{1,2}[-/]\d{2,4}", text.strip()):
         return "day or month first? Write 2021-03-04, or 4.3.2021 with dots"
+    if re.match(r"\d{1,2}[-. ][^\W\d_]{3,}\.?[-. ]\d{4}", text.strip()):
+        return "a month that is not named in English; write 2026-05-01T10:00:00"
     if re.match(r"\d{1,2}:\d\d", text.strip()):
         return "a time of day without its date; write 2026-05-01T08:00:00, or seconds"
     if re.search(r"\d\s?[ap]\.?m\.?$", text.strip(), re.IGNORECASE):

@@ -13,10 +13,9 @@ from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
-from mapfilter.radio.identities import LIMITS, parse_cgi, parted_network
+from mapfilter.radio.identities import LIMITS, UNAVAILABLE, parse_cgi, parted_network
 from mapfilter.tracks.readers.recorded.reading import Reading
 
-_UNAVAILABLE = (-1, 2**31 - 1, 2**63 - 1)
 _NO_CELL = (2**28 - 1, 2**36 - 1)
 """Identities with all bits set of LTE and NR, which are of no cell."""
 
@@ -24,7 +23,7 @@ _NO_CELL = (2**28 - 1, 2**36 - 1)
 def available(values: Ints, there: Bools) -> Floats:
     """Return whole numbers as floats, NaN where missing or marked as not available."""
     number = values.astype(np.float64)
-    return np.where(there & ~np.isin(values, _UNAVAILABLE), number, np.nan)
+    return np.where(there & ~np.isin(values, UNAVAILABLE), number, np.nan)
 
 
 def parse_identities(texts: np.ndarray) -> dict[str, Floats]:

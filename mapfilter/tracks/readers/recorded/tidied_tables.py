@@ -59,6 +59,9 @@ def tidied(
             rows = rows[~duplicate].reset_index(drop=True)
         # Equal steps are distance lost; a file with a row for each cell repeats them.
         counted = time if table == "motion" and not by_cell else rows["time_s"]
+        if "provider" in rows and rows["provider"].notna().any():
+            # Each provider has its own.
+            counted = rows.loc[rows["provider"] == rows["provider"].mode().iloc[0], "time_s"]
         if table not in _SEVERAL and (cut := cut_times(np.asarray(counted))):
             ignored.append(f"{table}: {cut}")
     if table == "positions":
