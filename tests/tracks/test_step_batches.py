@@ -20,10 +20,14 @@ def delivered(time_s):
     return np.ceil(time_s / EVERY_S) * EVERY_S
 
 
+def read_each(every_s):
+    """Return what a phone shows each second that reads its counter every so many seconds."""
+    return np.searchsorted(STEPS_S, np.floor(SECONDS / every_s) * every_s, side="right")
+
+
 STEPS_S = np.arange(1.0, SECONDS.size * CADENCE_HZ - 2) / CADENCE_HZ
 """Times at which a foot is set down."""
-COUNTED = np.searchsorted(STEPS_S, np.floor(SECONDS / EVERY_S) * EVERY_S, side="right")
-"""What a phone shows each second that reads its counter every 10 s."""
+COUNTED = read_each(EVERY_S)
 COMPASS = {"time": START_S + SECONDS, "compass_deg": azimuth_deg(SECONDS)}
 
 
@@ -105,6 +109,26 @@ def test_after_a_rest_steps_are_those_of_the_last_seconds(tmp_path):
     before = motion.set_index("time_s")["step_m"]
     assert before[before.index <= 293].sum() == 0
     assert before[(before.index > 294) & (before.index <= 300)].min() == pytest.approx(STEP_M)
+
+
+@pytest.mark.parametrize("every_s", [20.0, 30.0, 60.0])
+@pytest.mark.parametrize("own", [False, True])
+def test_long_batches_have_the_steps_of_the_time_since_the_last_one(every_s, own, tmp_path):
+    """More than 50 steps at once were taken for a counter that jumps: no motion."""
+    counted = read_each(every_s)
+    log = read(tmp_path, COMPASS | {"steps": np.diff(counted, prepend=0) if own else counted})
+    assert log.motion["step_m"].notna().all()
+    assert log.motion["step_m"].sum() == pytest.approx(STEP_M * counted[-1])
+    assert log.motion["step_m"][1:].max() < 1.5
+
+
+@pytest.mark.parametrize("rest_s", [1, 20])
+def test_more_steps_than_anybody_makes_since_the_last_one_are_a_jump(rest_s, tmp_path):
+    counted = np.searchsorted(STEPS_S, SECONDS, side="right")
+    counted[300 : 300 + rest_s] = counted[300]
+    counted[300 + rest_s :] += 5 * (rest_s + 10)
+    motion = read(tmp_path, COMPASS | {"steps": counted}).motion
+    assert motion["time_s"][motion["step_m"].isna()].tolist() == [300 + rest_s]
 
 
 def test_rows_of_cells_repeat_a_counter_and_are_no_batches(tmp_path):

@@ -64,11 +64,20 @@ def counted_steps(time_s: Floats, count: Floats) -> tuple[Floats, Floats, str]:
         # A counter begins anew when a phone is started.
         change, how = np.diff(_without_jitter(count)), "by a counter"
     lasted_s = np.diff(time_s)
-    walkable = (change >= 0) & (change <= STEPS_PER_S * np.maximum(lasted_s, LATE_S))
+    # Phones deliver batches: the steps are those of the time since the last ones.
+    most = STEPS_PER_S * np.maximum(_since_steps_s(time_s, change), LATE_S)
+    walkable = (change >= 0) & (change <= most)
     # Where a counter is written only when it grows, a few steps end a long rest.
     paused = (lasted_s > PAUSE_S) & (change > _JITTER)
     steps = np.where(walkable & ~paused, change, np.nan)
     return time_s, np.concatenate([count[:1] if is_own else [0.0], steps]), how
+
+
+def _since_steps_s(time_s: Floats, change: Floats) -> Floats:
+    """Return the time since the last row with steps, else since the first row."""
+    stepped = np.where(change != 0, np.arange(1, time_s.size), 0)
+    last = np.maximum.accumulate(np.concatenate([[0], stepped]))
+    return time_s[1:] - time_s[last[:-1]]
 
 
 def _without_jitter(count: Floats) -> Floats:
