@@ -206,17 +206,16 @@ class FixWeighing:
         """
         if self.own is not MOVING or not elapsed_s > 0:
             return None
-        own, size = self.own, self.own.size
+        own, size, where = self.own, self.own.size, [self.own.east, self.own.north]
+        expected_m2 = moments.covariance[np.ix_(where, where)] + noise_m2
+        if not contradicts(off_m, expected_m2):
+            return None
         velocity = list(own.velocity)
         mean_mps, spread_mps2 = moments.mean[velocity], moments.covariance[velocity, velocity]
         speed_mps = sqrt(float(mean_mps @ mean_mps + spread_mps2.sum()))
         root = min(_FREER_MPS_PER_SQRT_S, _SHARE * speed_mps * sqrt(3 / elapsed_s))
         more = constant_velocity(elapsed_s, root, noise="continuous").noise
-        where = [own.east, own.north]
-        predicted_m2, more_m2 = (one[np.ix_(where, where)] for one in (moments.covariance, more))
-        if not contradicts(off_m, predicted_m2 + noise_m2):
-            return None
-        if contradicts(off_m, predicted_m2 + more_m2 + noise_m2):
+        if contradicts(off_m, expected_m2 + more[np.ix_(where, where)]):
             return None
         transition, noise, shift = at_rest(self.layout)
         moved = np.zeros((self.layout.size, size))
