@@ -55,7 +55,8 @@ def test_smoothed_positions_replace_those_since_the_start():
         found.append(output.fix)
     assert len(smoother.history.beliefs) == 2
     assert smoother.where == [0, 1]
-    first_m2 = 1 / (1 / 900.0 + 1 / 25.0)
+    # Before the first fix, ten of its deviations.
+    first_m2 = 1 / (1 / 2500.0 + 1 / 25.0)
     moved_m2 = first_m2 + 16.0
     gain = moved_m2 / (moved_m2 + 36.0)
     last_m2 = (1 - gain) * moved_m2

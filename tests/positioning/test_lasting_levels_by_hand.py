@@ -40,14 +40,15 @@ class Oracle:
         self.n = self.first + 1 + len(plan.cells) + 2
         self.moved_m = np.inf
 
-    def start(self, east_m, north_m):
+    def start(self, east_m, north_m, fix_sd_m):
         own, options = self.first, self.options
         self.x, sd = np.zeros(self.n), np.zeros(self.n)
         self.x[self.at] = east_m, north_m
         sd[:own] = options.speed_sd_mps
         if self.reckoned:
             sd[2:4] = np.radians(options.bias_sd_deg), options.scale
-        sd[self.at] = options.start_sd_m
+        # So wide that the fix decides.
+        sd[self.at] = max(options.start_sd_m, 10 * fix_sd_m)
         sd[own], sd[own + 1 : -2] = options.level_offset_db, options.level_error_db
         sd[-2:] = options.fix_lasting_m
         self.p, self.sd, self.past = np.diag(sd**2), sd, []
@@ -154,7 +155,7 @@ def walked(oracle, smoother, hears, epochs, *, level_sd_db=6.0, fixes=(0,), fix_
         if k in fixes:
             fix = GnssFix(EAST + rng.normal(0, 5), NORTH + rng.normal(0, 5), fix_m2, fix_m2, 0.0)
             if k == 0:
-                oracle.start(fix.east_m, fix.north_m)
+                oracle.start(fix.east_m, fix.north_m, np.sqrt(fix_m2))
             oracle.fix(fix.east_m, fix.north_m, fix_m2)
         reading = {}
         for i in hears(k):

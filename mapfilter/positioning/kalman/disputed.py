@@ -205,9 +205,9 @@ class FixRecord:
         """
         time_s, off_m, predicted_m2, stated_m2, *_, gone_m = fix
         noise_m2 = self.understated * stated_m2
-        squared = float(off_m @ np.linalg.solve(predicted_m2 + noise_m2, off_m))
+        squared = _squared(off_m, predicted_m2 + noise_m2)
         if squared <= _LIMIT:
-            found = float(off_m @ np.linalg.solve(predicted_m2 + stated_m2, off_m)) / 2
+            found = _squared(off_m, predicted_m2 + stated_m2) / 2
             excess = self.excess + (min(found, _MOST) - self.excess) / _MEMORY
             # Fixes that leave a rest may be right: a lift, or a queue of cars.
             excess = min(excess, self.excess) if fix.rests else excess
@@ -243,6 +243,15 @@ class FixRecord:
 
     def _anew(self) -> FixRecord:
         return FixRecord(self.excess, begun=self.begun + 1)
+
+
+def contradicts(off_m: Floats, covariance_m2: Floats) -> bool:
+    """Return whether a fix so far from its prediction is none of its covariance (2, 2)."""
+    return _squared(off_m, covariance_m2) > _LIMIT
+
+
+def _squared(off_m: Floats, covariance_m2: Floats) -> float:
+    return float(off_m @ np.linalg.solve(covariance_m2, off_m))
 
 
 def _ruling(rows: Floats, patience_s: float, *, rests: bool) -> Ruling:

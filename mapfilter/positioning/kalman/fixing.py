@@ -10,13 +10,20 @@ from typing import NamedTuple
 import numpy as np
 
 from mapfilter._types import Floats
-from mapfilter.filters.gaussian import Method
+from mapfilter.filters.gaussian import Gaussian, Method
+from mapfilter.models.motion import constant_velocity
 from mapfilter.models.ranging import position_fix
 from mapfilter.models.state import MOVING, StateLayout
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.gnss.wander import FixWander
 from mapfilter.positioning.kalman.belief import SumBelief
-from mapfilter.positioning.kalman.disputed import ComparedFix, FixVerdict, Patience, Ruling
+from mapfilter.positioning.kalman.disputed import (
+    ComparedFix,
+    FixVerdict,
+    Patience,
+    Ruling,
+    contradicts,
+)
 from mapfilter.positioning.kalman.fix_errors import FixErrors
 from mapfilter.positioning.kalman.lasting import Motion, fix_layout, rescaled, white_part
 from mapfilter.positioning.kalman.models import KalmanOptions, compiled
@@ -28,6 +35,10 @@ _RECKONED, _MOVING = Patience(30.0, 120.0), Patience(5.0, 5.0)
 """With dead reckoning, and where but a velocity is known."""
 _UNSEEN_S = 20.0
 """Time without a fix after which one that contradicts the belief is as likely to be right."""
+_FREER_MPS_PER_SQRT_S = 4.0
+"""Random walk of the speed of a vehicle that brakes and turns: some 1.3 m/s² for 5 s."""
+_SHARE = 0.5
+"""Deviation of where it then is from where its velocity leads, as a share of that way."""
 
 
 class WeighedFix(NamedTuple):
@@ -130,6 +141,12 @@ class FixWeighing:
         if belief.weights.size == 1:
             moments, where = belief.moments, [own.east, own.north]
             off_m = np.array([fix.east_m, fix.north_m]) - moments.mean[where]
+            freer = self._freer(
+                moments, off_m, stated * record.understated, time_s - errors.fixed_s
+            )
+            if freer is not None:
+                belief, motion = belief.predict(*freer), after_each_other(motion, freer)
+                moments = belief.moments
             record, found = record.at_fix(
                 ComparedFix(
                     time_s,
@@ -178,6 +195,34 @@ class FixWeighing:
             errors = errors.wandered(fix, float(np.trace(stated)) / 2, time_s, turns)
         errors = errors.proven(time_s, self.options.fix_lasting_s)
         return WeighedFix(belief, errors, motion, found.ruling, nis, info.used)
+
+    def _freer(
+        self, moments: Gaussian, off_m: Floats, noise_m2: Floats, elapsed_s: float
+    ) -> Motion | None:
+        """Return the motion by which a fix agrees that contradicts a constant velocity.
+
+        None where it does not contradict it, or one that brakes and turns, too; or where steps tell
+        the way. Seconds after the last fix one may be anywhere that an acceleration leads to.
+        """
+        if self.own is not MOVING or not elapsed_s > 0:
+            return None
+        own, size, where = self.own, self.own.size, [self.own.east, self.own.north]
+        expected_m2 = moments.covariance[np.ix_(where, where)] + noise_m2
+        if not contradicts(off_m, expected_m2):
+            return None
+        velocity = list(own.velocity)
+        mean_mps, spread_mps2 = moments.mean[velocity], moments.covariance[velocity, velocity]
+        speed_mps = sqrt(float(mean_mps @ mean_mps + spread_mps2.sum()))
+        root = min(_FREER_MPS_PER_SQRT_S, _SHARE * speed_mps * sqrt(3 / elapsed_s))
+        more = constant_velocity(elapsed_s, root, noise="continuous").noise
+        if contradicts(off_m, expected_m2 + more[np.ix_(where, where)]):
+            return None
+        transition, noise, shift = at_rest(self.layout)
+        moved = np.zeros((self.layout.size, size))
+        moved[:size] = np.eye(size)
+        for place in self._places:
+            moved[place, where] = 1.0
+        return transition, noise + moved @ more @ moved.T, shift
 
     @property
     def _places(self) -> list[list[int]]:
