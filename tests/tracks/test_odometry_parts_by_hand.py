@@ -54,6 +54,8 @@ def test_missing_yaw_rates_between_others(rate, joined):
         ([9, 71, 9], 2.0, [1]),
         ([12, 71, 12], 2.0, []),
         ([9, 71, 12], 2.0, []),
+        # Since the last row of the speed before.
+        ([*[9] * 30, 71, *[10] * 30], 0.1, [30]),
         # Rows without a speed are not between.
         ([9, NAN, 71, NAN, 9], 0.1, [2]),
         ([9, 71], 0.1, []),
