@@ -82,3 +82,12 @@ def test_positions_within_5_km_are_near(east_m, north_m, is_near):
     assert fault.expected == f"positions near the database's {area}"
     where = f"{east.min():.0f}..{east.max():.0f} m east, {north.min():.0f}..{north.max():.0f}"
     assert (fault.got, fault.hint) == (f"{where} m north", "another log")
+
+
+def test_a_fault_names_the_mistake_that_explains_it():
+    """Positions in the middle of Lyon whose longitude has lost its sign, and those of nowhere."""
+    for lon_deg, hint in ((-4.81, "a lost sign of longitude"), (9.0, "another log")):
+        east_m, north_m = project(CRS, [lon_deg, lon_deg], [45.705, 45.71])
+        faults = Faults()
+        check_near("log.csv", east_m, north_m, LYON, faults, "another log")
+        assert [fault.hint for fault in faults.found] == [hint]
