@@ -158,7 +158,7 @@ class LevelMemory:
         if not wanted:
             return self, kept
         held = [slot_of[band] for band in bands.tolist() if band in slot_of]
-        order = [slot for slot in np.lexsort((self.band >= 0, self.used)) if slot not in held]
+        order = [slot for slot in np.argsort(self.used, kind="stable") if slot not in held]
         at = np.array(order[: len(wanted)], dtype=np.intp)
         band = self.band.copy()
         band[at] = wanted[: at.size]

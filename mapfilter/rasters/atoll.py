@@ -168,7 +168,6 @@ def _rows(
         given = dict(zip(header, (text.strip() for text in texts), strict=True))
         if wrong := id_fault(given["TX_NAME"]):
             faults.add(f"{where}, TX_NAME", *wrong)
-            continue
         path = _within(table.path.parent, given["FILE_NAME"], names)
         if path is None:
             expected = f"the name of a file in {table.path.parent}"
@@ -183,7 +182,6 @@ def _rows(
                 hint = "rasters linked instead of copied; links out of the folder are not followed"
                 hint += ", so that inputs reach no other files: copy them, or link the whole folder"
             faults.add(f"{where}, FILE_NAME", expected, got, hint)
-            continue
         values: dict[str, float | None] = {}
         for name in _NUMBERS:
             values[name] = table.number(given[name]) if given.get(name) else None
@@ -199,8 +197,8 @@ def _rows(
         side_m = values["RESOLUTION"]
         if side_m is not None and side_m <= 0:
             faults.add(f"{where}, RESOLUTION", "metres > 0", f"{side_m:g}")
-            continue
-        yield IndexRow(where, given["TX_NAME"], path, side_m, values["NBITS"], area)
+        if path is not None and not wrong:
+            yield IndexRow(where, given["TX_NAME"], path, side_m, values["NBITS"], area)
 
 
 def _within(folder: Path, name: str, names: dict[str, str]) -> Path | None:

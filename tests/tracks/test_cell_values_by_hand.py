@@ -42,6 +42,29 @@ def read(tmp_path):
     return of
 
 
+@pytest.mark.parametrize(
+    ("lac", "value"),
+    [
+        # Hexadecimal digits in all that have a digit, and a letter in half of them at least.
+        (["1A", "10"], 0x1A),
+        (["1A", "2B"], 0x1A),
+        (["26", "2B", "10"], 26),
+        (["26", "unknown"], 26),
+        (["26", "2B.5"], 26),
+        (["unknown", "none"], NAN),
+        (["", "-"], NAN),
+    ],
+)
+def test_hexadecimal_codes_without_a_mark(tmp_path, lac, value):
+    lines = [f"{START_S + i:.0f},{code},7,-80" for i, code in enumerate(lac)]
+    path = tmp_path / "cells.csv"
+    path.write_text("\n".join(["time,lac,ci,level_dbm", *lines]) + "\n")
+    found = read_recording(path)
+    assert found.tables["radio"]["lac"].tolist()[:1] == pytest.approx([value], nan_ok=True)
+    told = "lac: taken for hexadecimal numbers"
+    assert (told in found.notes) == (lac[0] == "1A")
+
+
 # TS 45.005 and 45.010: ARFCN of 10 bits, BSIC of 6, timing advances to 219 (GSM 400). TS 25.101
 # and 25.213: UARFCN of 14 bits, 512 scrambling codes. TS 36.101, 36.211 and 36.213: EARFCN of 18
 # bits, 504 PCI, 1282 steps. TS 38.104, 38.211 and 38.213: NR-ARFCN to 3279165, 1008 PCI, 3846

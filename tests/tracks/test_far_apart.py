@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import InputError
+from mapfilter.tracks.checks.far_apart import _apart_m
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.open_log import open_log
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions
@@ -140,3 +141,27 @@ def test_tracks_on_two_sides_of_180_degrees_lie_as_far_apart_as_elsewhere(tmp_pa
     other = written(tmp_path, "other", LAT, LON - 25 - 179.6)
     (told,) = [note for note in open_log([one, other]).log.notes if "km from those" in note]
     assert "other.csv: positions lie 33.4 km from those" in told
+
+
+def area(west_deg, south_deg):
+    """Return a hundred positions of an area of a degree: 96 of them span 0.9504 degrees."""
+    step = np.arange(100) / 100
+    return pd.DataFrame({"lon_deg": west_deg + step, "lat_deg": south_deg + step})
+
+
+@pytest.mark.parametrize(
+    ("west_deg", "south_deg", "east_m", "north_m"),
+    [
+        # The 2nd and 98th of a hundred are at 0.0198 and 0.9702 degrees.
+        (25.0, 62.0, 0.0, 1.0496 * 111_195),
+        (25.0, 58.0, 0.0, 1.0496 * 111_195),
+        (27.0, 60.0, 1.0496 * 111_195 * np.cos(np.radians(60.495)), 0.0),
+        (28.0, 63.0, 2.0496 * 111_195 * np.cos(np.radians(60.495)), 2.0496 * 111_195),
+        (25.9, 60.9, 0.0, 0.0),
+        (385.0, 60.0, 0.0, 0.0),
+        (25.0, 89.5, np.inf, 0.0),
+    ],
+)
+def test_the_distance_of_two_areas(west_deg, south_deg, east_m, north_m):
+    found = _apart_m(area(25.0, 60.0), area(west_deg, south_deg))
+    assert found == pytest.approx(np.hypot(east_m, north_m), rel=1e-9)

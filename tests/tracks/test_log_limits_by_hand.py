@@ -9,6 +9,7 @@ from mapfilter.tracks.checks.clock_notes import week_fault
 from mapfilter.tracks.checks.log_checks import check_clocks, check_steps, ends_early, odd_start
 from mapfilter.tracks.column_values import TableFaults, column_values
 from mapfilter.tracks.schema import SCHEMA
+from mapfilter.tracks.tables import tidy_table
 
 TURN_RAD = 6.283185307
 
@@ -38,6 +39,26 @@ def test_values_beside_the_ends_of_a_column_are_refused(table, name, low, high):
     column_values(column, pd.DataFrame({name: values}), found)
     faults = "\n".join(map(str, found.faults.found))
     assert [f"row {row}, {name}" in faults for row in (1, 2, 3, 4)] == [False, False, True, True]
+
+
+@pytest.mark.parametrize(
+    ("technology", "name", "most", "hint"),
+    [
+        ("GSM", "bsic", 63, ""),
+        ("UMTS", "arfcn", 16_383, ""),
+        ("LTE", "timing_advance", 1282, "metres for steps"),
+        ("LTE", "bsic", 503, ""),
+    ],
+)
+def test_codes_of_a_log_are_those_of_their_technology(technology, name, most, hint):
+    """Each row by its own: the last two are of a technology that has larger ones, and of none."""
+    rows = {"time_s": np.arange(4.0), "role": "serving", "level_dbm": -80.0, "cell": "a"}
+    rows |= {"technology": [technology, technology, "CDMA", None], name: [most, most + 1] * 2}
+    faults = Faults()
+    tidy_table("radio", pd.DataFrame(rows), "radio.csv", faults)
+    found = [fault for fault in faults.found if f"0..{most} in {technology}" in fault.expected]
+    assert [fault.where for fault in found] == [f"radio.csv row 2, {name}"]
+    assert found[0].hint == hint
 
 
 def faults_of(check, *given):

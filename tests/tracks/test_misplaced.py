@@ -53,3 +53,41 @@ def test_degrees_are_no_metres(scale):
     given = degrees_for_metres(np.array([4.81]) * scale, np.array([45.71]) * scale, LYON)
     assert given.startswith("degrees")
     assert given.endswith("given for metres")
+
+
+@pytest.mark.parametrize(
+    ("east_m", "north_m", "is_near"),
+    [
+        (4990.0, 0.0, True),
+        (-4990.0, 0.0, True),
+        (0.0, 4990.0, True),
+        (5010.0, 0.0, False),
+        (0.0, 5010.0, False),
+        (3600.0, 3600.0, False),
+        (3500.0, 3500.0, True),
+    ],
+)
+def test_positions_within_5_km_are_near(east_m, north_m, is_near):
+    """Of an area of 2 km; 3500 and 3600 m to both sides are 4950 and 5091 m away."""
+    lattice = Lattice(CRS, 500_000.0, 4_002_000.0, 5.0, 400, 400)
+    east = 500_000.0 + np.array([3e4, east_m + 2000.0 * (east_m > 0)])
+    north = 4_000_000.0 + np.array([9e4, north_m + 2000.0 * (north_m > 0)])
+    faults = Faults()
+    check_near("log.csv", east, north, lattice, faults, "another log")
+    if is_near:
+        assert faults.found == []
+        return
+    (fault,) = faults.found
+    area = "500000..502000 m east, 4000000..4002000 m north"
+    assert fault.expected == f"positions near the database's {area}"
+    where = f"{east.min():.0f}..{east.max():.0f} m east, {north.min():.0f}..{north.max():.0f}"
+    assert (fault.got, fault.hint) == (f"{where} m north", "another log")
+
+
+def test_a_fault_names_the_mistake_that_explains_it():
+    """Positions in the middle of Lyon whose longitude has lost its sign, and those of nowhere."""
+    for lon_deg, hint in ((-4.81, "a lost sign of longitude"), (9.0, "another log")):
+        east_m, north_m = project(CRS, [lon_deg, lon_deg], [45.705, 45.71])
+        faults = Faults()
+        check_near("log.csv", east_m, north_m, LYON, faults, "another log")
+        assert [fault.hint for fault in faults.found] == [hint]

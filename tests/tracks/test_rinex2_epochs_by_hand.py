@@ -3,11 +3,12 @@
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.rinex2_epochs import _epochs, _gps_s, read_epochs2
-from mapfilter.tracks.readers.rinex_epochs import Wanted
+from mapfilter.tracks.readers.rinex_epochs import Wanted, _seconds
 
 START_S = 1_461_664_800
 """2026-05-01 10:00:00, in seconds since 6 January 1980: 46 years and 115.4 days."""
@@ -165,3 +166,23 @@ def test_lines_are_those_of_the_file():
         "epoch: fewer satellites than their number": [7],
         "epoch: no date, time and number of satellites": [8],
     }
+
+
+@pytest.mark.parametrize(
+    ("stamp", "seconds"),
+    [
+        ("2026 05 01 10 00 30.2500000", START_S + 30.25),
+        (" 2026  5  1 23 59 59.0 ", START_S + 13 * 3600 + 3599),
+        ("2026 05 01 10 00 60.5000000", START_S + 60.5),
+        ("1980 01 06 00 00  0.0", 0),
+        ("2261 12 31 00 00  0.0", (281 * 365 + 69 + 359) * 86_400),
+        *((stamp, None) for stamp in ("2026 05 01 24 00 00.0", "2026 05 01 10 60 00.0")),
+        *((stamp, None) for stamp in ("2026 05 01 10 00 61.0", "1979 12 31 23 00 00.0")),
+        *((stamp, None) for stamp in ("2262 01 01 00 00 00.0", "2026 02 29 10 00 00.0")),
+        *((stamp, None) for stamp in ("2026 13 01 10 00 00.0", "26 05 01 10 00 00.0", "")),
+    ],
+)
+def test_seconds_of_version_3(stamp, seconds):
+    """Of the years from 1980 to 2261 69 are leap years: 2100 and 2200 are none."""
+    found = _seconds(pa.array(["2026 05 01 10 00 00", stamp])).tolist()
+    assert found == pytest.approx([START_S, np.nan if seconds is None else seconds], nan_ok=True)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import InputError
+from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.recorded.recorded_field import Field
 from mapfilter.tracks.readers.recorded.tables import RECORDED
 from mapfilter.tracks.readers.recorded.tallies import Tallies
@@ -207,3 +208,19 @@ def test_columns_without_any_number_in_all_parts():
     for column, part, given in (("a", 1, 0), ("a", 5, 2), ("b", 1, 0), ("b", 5, 0), ("c", 1, 1)):
         tallies.add_texts(column, part, given)
     assert tallies.empty == ("b",)
+
+
+def test_unwrapped_headings_are_wrapped():
+    """Those that go on beyond a turn by 6.3 rad, in the table that is kept."""
+    reading = Reading(PATH)
+    headings = [5.0, 6.1, 7.2, 8.3]
+    reading.add(
+        "motion",
+        {"time_s": 1.78e9 + np.arange(4.0), "step_m": 1.0, "heading_rad": headings},
+        range(4),
+    )
+    found = reading.tables["motion"][0]["heading_rad"].tolist()
+    assert found == pytest.approx([5.0, 6.1, 7.2 - 2 * np.pi, 8.3 - 2 * np.pi])
+    assert reading.notes == [
+        "motion, heading_rad: 2 values beyond a turn, wrapped (unwrapped)",
+    ]

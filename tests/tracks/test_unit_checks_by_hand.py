@@ -14,6 +14,7 @@ from mapfilter.tracks.checks.exchanged import (
     _is_heading,
     _negative_share,
     _unsigned,
+    check_columns,
     sideways_mps2,
 )
 from mapfilter.tracks.checks.stated_errors import stated_note
@@ -103,6 +104,23 @@ def test_vehicles_are_slower_than_70_mps_most_of_the_time():
     assert _fast_mps(np.full(60, -70.5)) == 70.5
     assert _fast_mps(np.full(59, 90.0)) == 0.0
     assert _fast_mps(np.repeat([90.0, 20.0], [3, 97])) == 0.0
+
+
+def test_headings_stand_for_turns_of_steps_alone():
+    """Rates of 1 rad/s that hardly change are those of a vehicle in a circle, at 2 m/s."""
+    steady = 1.0 + 0.01 * np.sin(np.arange(100.0))
+    of_steps = ended("motion", "step_m", np.full(100, 2.0), turn_rad=steady)
+    with pytest.raises(InputError) as raised:
+        check_columns(of_steps)
+    assert str(raised.value) == (
+        "made.csv, motion, turn_rad: expected changes of heading in each interval, found 1.0 rad "
+        "in the median, changing slowly (likely: headings (heading_rad, or compass_deg) for their "
+        "changes)"
+    )
+    (note,) = check_columns(
+        ended("odometry", "speed_mps", np.full(100, 2.0), yaw_rate_radps=steady)
+    )
+    assert "yaw_rate_radps: all of one sign" in note
 
 
 @pytest.mark.parametrize(
