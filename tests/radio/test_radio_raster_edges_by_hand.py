@@ -1,6 +1,7 @@
 """Limits of rasters by hand: numbers that mean no data, coinciding pixels, rows of an index."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from mapfilter.errors import InputError
 from mapfilter.lattice import Lattice
 from mapfilter.rasters.atoll import IndexRow, read_index
 from mapfilter.rasters.resampling import _alike, _shift, read_on
-from mapfilter.rasters.undeclared import nodata_taken_as_level
+from mapfilter.rasters.undeclared import check_nodata_stated, nodata_taken_as_level
 
 CRS = "EPSG:32635"
 
@@ -210,3 +211,29 @@ def test_the_header_that_an_index_gives():
         "ULXMAP": 2.5,
         "ULYMAP": 27.5,
     }
+
+
+@pytest.mark.parametrize(
+    ("quantity", "usual", "marker", "is_refused"),
+    [
+        # What would be the strongest level or the least loss; deviations may have any number.
+        ("level", -80, -1, True),
+        ("level", -100, -200, False),
+        ("loss", 120, 0, True),
+        ("loss", 120, 255, False),
+        ("deviation", 6, 0, False),
+        ("deviation", 120, 0, False),
+    ],
+)
+def test_markers_that_would_be_strong_levels(quantity, usual, marker, is_refused):
+    band = np.full((20, 20), usual, dtype=np.float32)
+    band[:2] = marker
+    try:
+        check_nodata_stated(band[None], ["A"], quantity, 1.0, Path("a.bil"))
+    except InputError as error:
+        assert is_refused
+        (fault,) = error.faults
+        assert fault.where == "a.bil pixels, cell A"
+        assert fault.got == f"{marker:g} in 10% of the pixels of a tile"
+    else:
+        assert not is_refused

@@ -6,8 +6,7 @@ import pytest
 from pyproj import Transformer
 
 import mapfilter as mf
-from mapfilter.errors import Faults, InputError
-from mapfilter.tracks.joining.geographic import in_metres
+from mapfilter.errors import InputError
 from mapfilter.tracks.log import make_log
 from mapfilter.tracks.store import read_log
 
@@ -136,16 +135,3 @@ def test_degrees_of_few_decimals_have_their_error(decimals, sd_m):
     # A few rows may be round by chance, and a place that was stated once is no receiver's.
     assert make_log(CRS, gnss=rows.iloc[:9]).notes == ()
     assert make_log(CRS, gnss=rows.assign(lat_deg=50.0, lon_deg=14.0)).notes == ()
-
-
-def test_degrees_without_any_other_column_are_placed():
-    """Their times may be an index."""
-    faults = Faults()
-    degrees = positions()[["lat_deg", "lon_deg"]]
-    found = in_metres("truth", degrees, "truth", CRS, faults)
-    east_m, north_m = Transformer.from_crs("EPSG:4326", CRS, always_xy=True).transform(LON, LAT)
-    assert found.rows["east_m"].to_numpy() == pytest.approx(east_m, abs=1e-6)
-    assert found.rows["north_m"].to_numpy() == pytest.approx(north_m, abs=1e-6)
-    assert faults.found == []
-    # One of the two is none.
-    assert in_metres("truth", degrees[["lat_deg"]], "truth", CRS, faults).rows.shape == (3, 1)

@@ -5,9 +5,11 @@ import pandas as pd
 import pytest
 
 from mapfilter.errors import Faults
+from mapfilter.geodesy import project
 from mapfilter.tracks.checks.clock_notes import week_fault
 from mapfilter.tracks.checks.log_checks import check_clocks, check_steps, ends_early, odd_start
 from mapfilter.tracks.column_values import TableFaults, column_values
+from mapfilter.tracks.joining.geographic import in_metres
 from mapfilter.tracks.schema import SCHEMA
 from mapfilter.tracks.tables import tidy_table
 
@@ -168,3 +170,16 @@ def test_steps_that_only_grow_are_a_distance_or_a_counter():
     assert steps(grown[:19]) == ""
     assert steps(grown[:20]) == ""
     assert steps(grown[:21]) != ""
+
+
+def test_degrees_without_any_other_column_are_placed():
+    """Their times may be an index."""
+    faults, crs = Faults(), "EPSG:32633"
+    degrees = pd.DataFrame({"lat_deg": [50.08, 50.081], "lon_deg": [14.42, 14.421]})
+    found = in_metres("truth", degrees, "truth", crs, faults)
+    east_m, north_m = project(crs, degrees["lon_deg"], degrees["lat_deg"])
+    assert found.rows["east_m"].to_numpy() == pytest.approx(east_m, abs=1e-6)
+    assert found.rows["north_m"].to_numpy() == pytest.approx(north_m, abs=1e-6)
+    assert faults.found == []
+    # One of the two is none.
+    assert in_metres("truth", degrees[["lat_deg"]], "truth", crs, faults).rows.shape == (2, 1)
