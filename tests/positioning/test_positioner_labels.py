@@ -127,7 +127,7 @@ def test_only_a_reading_brings_a_lost_position_back(given):
 @pytest.mark.parametrize(
     ("given", "measured_m", "ends"),
     # A counter that stands still stays in doubt, slow steps do not.
-    [({}, 5.0, False), ({"fix": FIX}, 5.0, True), ({"fix": FIX}, 0.0, False)],
+    [({}, 5.0, False), ({"gnss": FIX}, 5.0, True), ({"gnss": FIX}, 0.0, False)],
 )
 def test_a_position_that_was_used_ends_what_slow_steps_have_to_show(given, measured_m, ends):
     watch = SensorWatch(moving_s=0.0, rest=Rest(0.0, pace_mps=1.5, measured_m=measured_m))
