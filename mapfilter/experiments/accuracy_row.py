@@ -8,13 +8,14 @@ from math import isfinite, nan
 
 import numpy as np
 
+from mapfilter._same import EqualByValue
 from mapfilter._types import Bools, Floats
 from mapfilter.evaluation.accuracy import mean_of
 from mapfilter.evaluation.success import wilson_interval, wilson_interval_of_routes
 
 
-@dataclass(frozen=True)
-class Row:
+@dataclass(frozen=True, eq=False)
+class Row(EqualByValue):
     """Accuracy of one method on one part of a data set.
 
     Parameters
@@ -54,8 +55,8 @@ class Row:
     published_m: float = nan
 
 
-@dataclass(frozen=True)
-class Success:
+@dataclass(frozen=True, eq=False)
+class Success(EqualByValue):
     """Share of successful runs and its 95 % interval; NaN where there is none."""
 
     share: float = nan

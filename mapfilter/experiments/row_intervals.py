@@ -9,14 +9,15 @@ from typing import Literal
 
 import numpy as np
 
+from mapfilter._same import EqualByValue
 from mapfilter._types import Bools, Floats
 from mapfilter.evaluation.intervals import LEAST_POOLED, pooled_interval, share_interval
 
 Over = Literal["units", "runs", "reports", ""]
 
 
-@dataclass(frozen=True)
-class RowInterval:
+@dataclass(frozen=True, eq=False)
+class RowInterval(EqualByValue):
     """The 95 % intervals of one row's errors, over what is independent of each other.
 
     Parameters

@@ -22,6 +22,7 @@ from typing import Annotated, Literal, Protocol
 import numpy as np
 from annotated_types import Ge
 
+from mapfilter._same import EqualByValue
 from mapfilter._types import Floats, Ints
 from mapfilter.filters.contract import Estimate, MotionStep, Reason, Status, UpdateInfo
 from mapfilter.options import NotNegative, Options
@@ -102,8 +103,8 @@ class Mode(IntEnum):
     FAILED = 2
 
 
-@dataclass(frozen=True, slots=True)
-class CandidateBelief:
+@dataclass(frozen=True, slots=True, eq=False)
+class CandidateBelief(EqualByValue):
     """Candidates and the motion since they were last matched.
 
     Parameters

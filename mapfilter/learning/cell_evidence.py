@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from mapfilter._same import EqualByValue
 from mapfilter._types import Floats, Ints
 from mapfilter.learning.likelihood import (
     OFFSETS_DB,
@@ -40,8 +41,8 @@ _MOVED_REACH_M, _MOVED_STEP_M, _MOVED_LEAST_M = 600.0, 75.0, 120.0
 _COARSE_DB: Floats = np.arange(-24.0, 24.5, 4.0)
 
 
-@dataclass(frozen=True)
-class Explanation:
+@dataclass(frozen=True, eq=False)
+class Explanation(EqualByValue):
     """What one hypothesis says of a cell.
 
     Parameters

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from mapfilter._inputs import read_input, toml_values
 from mapfilter._io import atomic_file
+from mapfilter._same import EqualByValue
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import Fault, Faults, InputError, fail
 from mapfilter.geodesy import same_crs, shown_crs
@@ -40,8 +41,8 @@ _MEANING = {
 }
 
 
-@dataclass(frozen=True)
-class Change:
+@dataclass(frozen=True, eq=False)
+class Change(EqualByValue):
     """One proposed change.
 
     Parameters

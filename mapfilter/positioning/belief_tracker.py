@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from mapfilter._same import EqualByValue
 from mapfilter.database.nearest import CellPointIndex
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.filters.contract import (
@@ -36,8 +37,8 @@ from mapfilter.tracks.schema import SERVING
 _SILENT = (Reason.USED, Reason.NOT_MOVED_ENOUGH)
 
 
-@dataclass(frozen=True, slots=True)
-class TrackState:
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackState(EqualByValue):
     """State of a journey.
 
     Parameters

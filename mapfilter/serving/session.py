@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from math import nan
 from typing import Any
 
+from mapfilter._same import EqualByValue
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.log_options import LogStatement
 from mapfilter.serving.events import Channel
@@ -17,8 +18,8 @@ _EMPTY_STATE_BYTES = 20_000
 _ARRAYS = ("state", "log_weight", "kept")
 
 
-@dataclass(frozen=True, slots=True)
-class Progress:
+@dataclass(frozen=True, slots=True, eq=False)
+class Progress(EqualByValue):
     """All that a session needs to go on; frozen, so that it can be saved while others come.
 
     Parameters

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
+from mapfilter._same import EqualByValue
 from mapfilter.errors import ConfigError, Faults, InputError, fail
 from mapfilter.geodesy import same_crs, shown_crs
 from mapfilter.radio.cells import CellPlan
@@ -26,8 +27,8 @@ _ROUTE, _IMU, _RADIO, _WALKER = range(4)
 _MOST_TICKS = 10_000_000
 
 
-@dataclass(frozen=True, slots=True)
-class SimulationSettings:
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulationSettings(EqualByValue):
     """Number, motion and sensors of simulated journeys.
 
     Parameters

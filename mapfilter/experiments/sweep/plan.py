@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from mapfilter._arguments import Argument, check_arguments, shown
+from mapfilter._same import EqualByValue
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.positioning import BUILT_IN
 from mapfilter.positioning.bayes.options import GridFilter
@@ -63,8 +64,8 @@ class Radio:
         return self.name.replace("ground truth", "reality")
 
 
-@dataclass(frozen=True, slots=True)
-class Reading:
+@dataclass(frozen=True, slots=True, eq=False)
+class Reading(EqualByValue):
     """A filter with its options, its name in tables, and its update length; NaN without one."""
 
     name: str

@@ -17,6 +17,7 @@ from math import exp, hypot, inf, isfinite, nan
 
 import numpy as np
 
+from mapfilter._same import EqualByValue
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.rivals.alternative import (
@@ -30,8 +31,8 @@ _NEGLIGIBLE, _CERTAIN = -9.0, 30.0
 """Log odds below which a rival is not looked at; bound above which they make no difference."""
 
 
-@dataclass(frozen=True, slots=True)
-class Recovery:
+@dataclass(frozen=True, slots=True, eq=False)
+class Recovery(EqualByValue):
     """Way over which a position has agreed since it was lost without a new search.
 
     Parameters

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from math import atan2, cos, hypot, isfinite, nan, radians, sin, sqrt
 from typing import NamedTuple
 
+from mapfilter._same import EqualByValue
 from mapfilter.angles import wrap_one_rad
 from mapfilter.filters.contract import MotionStep
 from mapfilter.positioning.epochs import headed
@@ -33,8 +34,8 @@ class Direction(NamedTuple):
     sd_rad: float
 
 
-@dataclass(frozen=True, slots=True)
-class Alignment:
+@dataclass(frozen=True, slots=True, eq=False)
+class Alignment(EqualByValue):
     """Headings by turns, and whether their direction on the ground is known.
 
     Parameters

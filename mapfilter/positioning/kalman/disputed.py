@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mapfilter._same import EqualByValue
 from mapfilter._types import Floats
 from mapfilter.positioning.kalman.stretches import LEAST_FIX_SD_M
 
@@ -148,8 +149,8 @@ class _Row(NamedTuple):
         return jump_m >= sqrt(_FAR * self.variance_m2)
 
 
-@dataclass(frozen=True, slots=True)
-class FixRecord:
+@dataclass(frozen=True, slots=True, eq=False)
+class FixRecord(EqualByValue):
     """How well fixes have agreed with the belief.
 
     Parameters

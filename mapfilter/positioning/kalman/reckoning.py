@@ -20,6 +20,7 @@ from math import cos, hypot, inf, isfinite, nan, radians, sin, sqrt
 
 import numpy as np
 
+from mapfilter._same import EqualByValue
 from mapfilter._types import Floats
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.filters.gaussian import Gaussian
@@ -70,8 +71,8 @@ def after_each_other(first: Motion, second: Motion) -> Motion:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Reckoning:
+@dataclass(frozen=True, slots=True, eq=False)
+class Reckoning(EqualByValue):
     """What is known of the sensors, and of ways without headings.
 
     Parameters

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from math import exp, expm1, isfinite, nan
 from typing import NamedTuple
 
+from mapfilter._same import EqualByValue
 from mapfilter.filters.contract import MotionStep
 from mapfilter.tracks.checks.speeds import walkers_unit_m
 
@@ -51,8 +52,8 @@ class Going(NamedTuple):
     slows: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Pace:
+@dataclass(frozen=True, slots=True, eq=False)
+class Pace(EqualByValue):
     """What is known of a log's motion rows; lengths and speeds are in its unit of steps.
 
     Parameters

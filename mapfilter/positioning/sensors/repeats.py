@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import degrees, isfinite, log, nan
 
+from mapfilter._same import EqualByValue
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.sensors.unmeasured import headless_step
 
@@ -33,8 +34,8 @@ _TURNS_RAD, _ROUNDING = 1e-9, 1e-4
 _Row = tuple[float, float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class MotionRepeats:
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionRepeats(EqualByValue):
     """What is known of how the rows of a journey repeat each other; rests do not count.
 
     Parameters

@@ -21,6 +21,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import exp, inf, isfinite, log, nan, radians, sqrt
 
+from mapfilter._same import EqualByValue
 from mapfilter.filters.contract import MotionStep
 from mapfilter.positioning.epochs import ReportRow
 from mapfilter.positioning.sensors.pace import WALKERS_MPS
@@ -71,8 +72,8 @@ _CERTAIN_NATS = -10.5
 52)."""
 
 
-@dataclass(frozen=True, slots=True)
-class Rest:
+@dataclass(frozen=True, slots=True, eq=False)
+class Rest(EqualByValue):
     """Reports since motion stands still, or is slow.
 
     Parameters

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from math import nan
 
+from mapfilter._same import EqualByValue
+
 _FIRST_WORDS = {"heading_rad": "headings", "turn_rad": "turns", "step_m": "steps"}
 
 MOTION_COLUMNS = tuple(_FIRST_WORDS)
@@ -16,8 +18,8 @@ BY_COMPASS = "steps and compass"
 """Words of a note on positions that are one; with these by headings of a compass."""
 
 
-@dataclass(frozen=True, slots=True)
-class MotionFault:
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionFault(EqualByValue):
     """What is wrong with a column of motion.
 
     Parameters

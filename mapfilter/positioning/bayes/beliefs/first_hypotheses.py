@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mapfilter._same import EqualByValue
 from mapfilter._types import Floats, Floats32
 from mapfilter.angles import wrap_rad
 from mapfilter.filters.belief_models import Cloud
@@ -46,8 +47,8 @@ _BEYOND_SHARE, BEYOND_AT_START = 0.15, 0.02
 """Share of the first hypotheses in the belt, and that of the first belief."""
 
 
-@dataclass(frozen=True, slots=True)
-class Start:
+@dataclass(frozen=True, slots=True, eq=False)
+class Start(EqualByValue):
     """Prior of a belief.
 
     Parameters

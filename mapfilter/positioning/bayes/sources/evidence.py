@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from math import log, nan
 from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 
+from mapfilter._same import EqualByValue
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import Reason
 from mapfilter.filters.particle import ParticleBelief
@@ -71,8 +72,8 @@ class FixedTerm:
         return self.value
 
 
-@dataclass(frozen=True, slots=True)
-class RadioReading:
+@dataclass(frozen=True, slots=True, eq=False)
+class RadioReading(EqualByValue):
     """One radio report and the terms of other sources, as the filter's model weighs them.
 
     Parameters
