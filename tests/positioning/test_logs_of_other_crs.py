@@ -142,11 +142,11 @@ def test_single_reports_of_a_log_in_another_crs(database):
 
 def test_epochs_are_in_the_crs_of_the_filter_that_takes_them():
     log, same = stated_in("EPSG:32630", gnss=True), walk_log()
-    found = [epoch.fix for epoch in mf.epochs(log, CRS) if epoch.fix is not None]
+    found = [epoch.gnss for epoch in mf.epochs(log, CRS) if epoch.gnss is not None]
     places = same.truth.iloc[::20]
     np.testing.assert_allclose([fix.east_m for fix in found], places["east_m"], atol=1e-6)
     np.testing.assert_allclose([fix.north_m for fix in found], places["north_m"], atol=1e-6)
-    own = next(epoch.fix for epoch in mf.epochs(log) if epoch.fix is not None)
+    own = next(epoch.gnss for epoch in mf.epochs(log) if epoch.gnss is not None)
     assert own.east_m == log.gnss["east_m"].iloc[0]
 
 

@@ -17,7 +17,7 @@ def followed(way, seen, apart_s):
     state, found, rng = tracker.begin({"gnss"}), [], np.random.default_rng(0)
     for k, place in enumerate(seen):
         fix = GnssFix(EAST + place.real, NORTH + place.imag, SD_M**2, SD_M**2, 0.0)
-        state, out = tracker.step(state, Epoch(apart_s * k, fix=fix), rng)
+        state, out = tracker.step(state, Epoch(apart_s * k, gnss=fix), rng)
         error = complex(out.fix.east_m - EAST, out.fix.north_m - NORTH) - way[k]
         found.append((abs(error), out.fix.radii_m[2], out.fix.status))
     errors_m, radii_m, statuses = zip(*found, strict=True)

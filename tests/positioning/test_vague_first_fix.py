@@ -50,7 +50,7 @@ def test_the_radius_of_a_first_fix_is_what_it_states(sd_m, plan, motion):
     tracker = KalmanFilter().over_sites(plan)
     given = GnssFix(EAST, NORTH, sd_m**2, sd_m**2, 0.0)
     state = tracker.begin(("gnss", "serving", *motion))
-    _, output = tracker.step(state, Epoch(0.0, fix=given), np.random.default_rng(0))
+    _, output = tracker.step(state, Epoch(0.0, gnss=given), np.random.default_rng(0))
     off_m = np.hypot(output.fix.east_m - EAST, output.fix.north_m - NORTH)
     assert off_m < 1e-3 * sd_m
     # Half of a normal belief lies within 1.1774 deviations, 95 % within 2.4477.
