@@ -37,7 +37,9 @@ _WITH_VALUE = re.compile(
     r"(?<![\w-])--(crs|filter|truth|format) (EPSG:\w+|ekf|\S+\.\w+|[a-z]+(?=, or none))"
 )
 _PLACE = re.compile(r"(?<![\w-])--origin LAT,LON")
-_SETTING = re.compile(r"\bfilter\.(?P<of>bayes|grid|kalman)\.(?P<name>\w+)(?: = (?P<value>[\w.]*\w))?")
+_SETTING = re.compile(
+    r"\bfilter\.(?P<of>bayes|grid|kalman)\.(?P<name>\w+)(?: = (?P<value>[\w.]*\w))?"
+)
 _OPTIONS = {"bayes": "BayesFilter", "grid": "GridFilter", "kalman": "KalmanFilter"}
 _RASTERS = 'rasters.resolution_m and rasters.resampling = "bilinear"'
 _OPENED = 'mf.open_rasters(…, resolution_m=…, resampling="bilinear")'
