@@ -37,7 +37,9 @@ _WITH_VALUE = re.compile(
     r"(?<![\w-])--(crs|filter|truth|format) (EPSG:\w+|ekf|\S+\.\w+|[a-z]+(?=, or none))"
 )
 _PLACE = re.compile(r"(?<![\w-])--origin LAT,LON")
-_SETTING = re.compile(r"\bfilter\.(?P<of>bayes|grid|kalman)\.(?P<name>\w+)(?: = (?P<value>\w+))?")
+_SETTING = re.compile(
+    r"\bfilter\.(?P<of>bayes|grid|kalman)\.(?P<name>\w+)(?: = (?P<value>[\w.]*\w))?"
+)
 _OPTIONS = {"bayes": "BayesFilter", "grid": "GridFilter", "kalman": "KalmanFilter"}
 _RASTERS = 'rasters.resolution_m and rasters.resampling = "bilinear"'
 _OPENED = 'mf.open_rasters(…, resolution_m=…, resampling="bilinear")'
@@ -56,6 +58,8 @@ def in_python(text: str) -> str:
     'mapfilter convert --crs EPSG:CODE; crs="EPSG:CODE"'
     >>> in_python("if a vehicle moved, set filter.bayes.vehicle = true")
     'if a vehicle moved, set BayesFilter(vehicle=True)'
+    >>> in_python("filter.bayes.level_error_db = 7.5 (filter.kalman.fix_sd_m).")
+    'BayesFilter(level_error_db=7.5) (fix_sd_m of KalmanFilter).'
     """
     text = _SETTING.sub(_option, text).replace(_RASTERS, _OPENED)
     text = text.replace("--zone of convert and replay", "zone of mf.read_log")

@@ -90,7 +90,8 @@ def arrange(
             picked = {name: at for name, at in picked.items() if name not in helpers}
     unused = _unused(header, picked, layout, columns)
     units = doubtful_units([Heading.of(name) for name in header], picked)
-    translated = "" if columns or layout != "atoll" else _translated(header, picked)
+    by_itself = {name: at for name, at in picked.items() if name not in columns}
+    translated = _translated(header, by_itself) if layout == "atoll" else ""
     notes += (*tally.notes_of_cells(), *filter(None, (translated, units, unused)))
     shown = {
         name: f"{header[at[0]]} ({name})" for name, at in picked.items() if header[at[0]] != name

@@ -63,8 +63,11 @@ _PLACES = {"lat": _OF_DEGREES, "lon": _OF_DEGREES, "east": _OF_METRES, "north": 
 _KNOWN_UNITS = frozenset[str]().union(*(unit.written | unit.others for unit in _UNITS.values()))
 _BEFORE_UNITS = re.compile(r"^(in|decimal)\s+")
 """Words before a unit, as in "in m"; "in" alone is inches."""
-_ABOVE_SEA = re.compile(r"\b(?:nn|nhn|ngf|asl|amsl|msl)\b|\bü\.? ?m\b|üNN|niveau", re.IGNORECASE)
-"""What headings of heights above the sea say, which no antenna is told by."""
+_ABOVE_SEA = re.compile(
+    r"\b(?:nn|nhn|ngf|asl|amsl|msl|mer|meer\w*|s\. ?m)\b|\bü\.? ?m\b|üNN|niveau(?! (?:du )?sol)",
+    re.IGNORECASE,
+)
+"""What headings of heights above the sea say; those of antennas are above the ground."""
 _BRACKETS = {")": "(", "]": "["}
 _APART = re.compile(r"[\s_-]+")
 _ALIKE = 0.85

@@ -227,6 +227,11 @@ def is_log(path: str | Path) -> bool:
     return (Path(path) / HEAD).is_file()
 
 
+def has_tables(folder: Path) -> bool:
+    """Return whether a folder has a file with the name of a table of a log."""
+    return bool(_table_files(folder))
+
+
 def check_log_replaceable(folder: Path) -> None:
     """Raise OutputError where a folder holds other files than a log that mapfilter wrote."""
     check_replaceable(folder, HEAD, FORMAT, _WRITTEN.__contains__)

@@ -221,7 +221,7 @@ def _check_milliseconds(table: str, rows: pd.DataFrame, found: TableFaults) -> N
     if between_s >= _SELDOM_S and moved_m >= _SOMEWHERE_M and speed_mps < _SLOW_MPS:
         got = f"{between_s:g} between rows, hence {speed_mps:.2g} m/s"
         words, unit = next(of for least_s, *of in _UNITS if between_s >= least_s)
-        hint = f"{words} for s; a CSV may have them in a column time_{unit}"
+        hint = f"{words} for s; convert them; a recording (CSV) may have a column time_{unit}"
         found.add(", time_s", "seconds", got, hint)
 
 

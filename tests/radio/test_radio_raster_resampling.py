@@ -162,7 +162,14 @@ def test_files_far_apart_or_of_two_systems():
     with pytest.raises(InputError, match="two systems mixed up"):
         common_lattice([made(), made(other)], None, "nearest")
     # GeoTIFF has the parameters of a system, which were all in the message.
-    other = replace(LATTICE, crs=pyproj.CRS.from_epsg(3067).to_wkt())
+    wkt = pyproj.CRS.from_epsg(3067).to_wkt()
+    assert wkt.count('"Longitude of natural origin",27') == 1
+    own = wkt.replace('"Longitude of natural origin",27', '"Longitude of natural origin",26')
+    # As WKT or by its code, a known system is one.
+    known = replace(LATTICE, crs=wkt)
+    with pytest.raises(InputError, match=r"as in .*, found EPSG:3067 \(likely"):
+        common_lattice([made(), made(known)], None, "nearest")
+    other = replace(LATTICE, crs=own)
     with pytest.raises(InputError, match=r"as in .*, found .*TM35FIN\(E,N\) \(likely"):
         common_lattice([made(), made(other)], None, "nearest")
 

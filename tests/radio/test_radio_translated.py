@@ -69,9 +69,12 @@ def test_accents_may_be_left_out(tmp_path):
             ("Hoehe", 32.0),
             ("Höhe (m ü. G.)", 32.0),
             ("Antennenhöhe (m)", 32.0),
+            ("Hauteur (m au-dessus du niveau du sol)", 32.0),
         ),
         *(("Höhe (m ü. NN)", 25.0), ("Höhe (m NHN)", 25.0), ("Hauteur (m NGF)", 25.0)),
-        ("Höhe (m ü. M.)", 25.0),
+        *(("Höhe (m ü. M.)", 25.0), ("Höhe (m ü. Meer)", 25.0), ("Höhe (m über Meer)", 25.0)),
+        *(("Hauteur (m au-dessus de la mer)", 25.0), ("Hauteur (m s.m.)", 25.0)),
+        ("Hauteur (m au-dessus du niveau de la mer)", 25.0),
     ],
 )
 def test_heights_above_the_sea_are_no_heights_of_antennas(heading, height_m, tmp_path):
@@ -118,7 +121,10 @@ def test_a_list_in_french_is_told_its_layout(tmp_path):
         read(tmp_path, FRENCH, layout="plan")
 
 
-def test_columns_that_a_person_names_are_not_noted(tmp_path):
-    columns = {"cell": "Émetteur", "height_m": "Hauteur (m)"}
+def test_only_columns_that_a_person_names_are_not_noted(tmp_path):
+    """Where one was named, all others were read without a word."""
+    columns = {"cell": "Émetteur", "height_m": "Hauteur (m)", "eirp_dbm": "PIRE (dBm)"}
     plan = read(tmp_path, FRENCH, columns=columns)
-    assert not any("French or German" in note for note in plan.notes)
+    (note,) = (note for note in plan.notes if "French or German" in note)
+    assert "'Antenne' (antenna)" in note
+    assert not any(name in note for name in columns.values())

@@ -68,6 +68,33 @@ def test_rows_out_of_order_and_second_series_are_sorted(tmp_path):
     assert "positions: times go backwards in 1 place; sorted" in notes
 
 
+SENSORS = pd.DataFrame({"time": np.arange(5, COUNT), "steps": 2 * np.arange(5, COUNT)})
+FIXES = WALK[["time", "latitude", "longitude"]]
+
+
+@pytest.mark.parametrize("named", [False, True])
+def test_series_of_which_the_second_begins_later_are_no_clock(tmp_path, named):
+    """The first one was taken minutes earlier."""
+    other = FIXES.iloc[5:] if named else SENSORS.assign(time=START_S + SENSORS["time"])
+    names = ("gps", "network") if named else (np.nan, np.nan)
+    both = [one.assign(provider=name) for one, name in zip((FIXES, other), names, strict=True)]
+    path = tmp_path / "both.csv"
+    pd.concat(both).to_csv(path, index=False)
+    found = read_recording(path)
+    assert not any("clock is set back" in note for note in found.notes)
+    assert found.tables["positions"]["time_s"].min() == START_S
+    assert found.tables["positions"]["time_s"].max() == START_S + COUNT - 1
+
+
+def test_a_clock_that_a_first_fix_sets_is_still_one(tmp_path):
+    """Rows before it have no positions, but what else the app logs."""
+    table = WALK.assign(time=set_back(60), fix=(np.arange(COUNT) >= AT).astype(int))
+    table.loc[table.index < AT, ["latitude", "longitude"]] = np.nan
+    path = tmp_path / "first.csv"
+    table.to_csv(path, index=False)
+    assert any("clock is set back" in note for note in read_recording(path).notes)
+
+
 def test_an_hour_of_local_times_is_a_matter_of_the_zone(tmp_path):
     local = pd.to_datetime(set_back(3600), unit="s").strftime("%Y-%m-%d %H:%M:%S")
     notes = read_recording(written(tmp_path, local)).notes

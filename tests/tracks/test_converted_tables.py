@@ -207,6 +207,30 @@ def test_states_that_tell_nothing_of_a_fix_leave_all_positions(tmp_path, states)
     assert len(places) == (COUNT if np.ndim(states) == 0 else COUNT // 2)
 
 
+@pytest.mark.parametrize("column", ["fix", "gps_fix"])
+@pytest.mark.parametrize("best", [2, 4, 5])
+def test_a_quality_of_a_fix_of_1_is_a_position(tmp_path, column, best):
+    """As in GGA of NMEA, of receivers with corrections: it was taken for none."""
+    states = np.where(JAMMED, 1, best)
+    table = {"time": TIME_S, "latitude": LAT, "longitude": LON, column: states}
+    assert len(read(tmp_path, table).tables["positions"]) == COUNT
+    table[column] = np.where(JAMMED, 1, 3)
+    assert len(read(tmp_path, table).tables["positions"]) == (~JAMMED).sum()
+
+
+def test_a_valid_date_is_no_fix(tmp_path):
+    """That of NAV-PVT stays while a receiver is jammed, and went before the kind of fix."""
+    table = {**NAV_PVT, "valid": 55, "fixType": np.where(JAMMED, 0, 3)}
+    assert len(read(tmp_path, table).tables["positions"]) == (~JAMMED).sum()
+
+
+def test_flags_may_have_decimals(tmp_path):
+    """A table with gaps is written so."""
+    states = np.where(JAMMED, 0.0, 1.0)
+    table = {"time": TIME_S, "latitude": LAT, "longitude": LON, "gps_valid": states}
+    assert len(read(tmp_path, table).tables["positions"]) == (~JAMMED).sum()
+
+
 def test_motion_in_rows_without_a_fix_counts(tmp_path):
     table = {"time": TIME_S, "lat": LAT, "lon": LON, "wheel_speed_mps": SPEED}
     found = read(tmp_path, {**table, "fix_type": np.where(JAMMED, 0, 3)})

@@ -220,10 +220,10 @@ def test_milliseconds_for_seconds(start):
     )
     assert "likely: milliseconds for s" in faults_of(motion=steps)
     assert "likely: milliseconds for s" in faults_of(truth=path)
-    assert "a CSV may have them in a column time_ms" in faults_of(truth=path)
+    assert "convert them; a recording (CSV) may have a column time_ms" in faults_of(truth=path)
     micro = pd.DataFrame({"time_s": 1e6 * np.arange(60.0), "east_m": 3.0 * np.arange(60)})
     told = faults_of(truth=micro.assign(north_m=0.0))
-    assert "microseconds for s; a CSV may have them in a column time_us" in told
+    assert "microseconds for s; convert them; a recording (CSV) may have a column time_us" in told
 
 
 def test_rare_fixes_of_a_moving_car_are_not_taken_for_milliseconds():

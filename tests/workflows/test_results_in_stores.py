@@ -3,14 +3,21 @@
 import pytest
 from command_line import ONE, assert_refused, contents, mapfilter
 
+from mapfilter.workflows.inputs.apart import check_in_no_store
 
-@pytest.fixture(params=[("manifest.json", "a database"), ("log.json", "a log")], ids=lambda p: p[0])
+STORES = {
+    "a database": ("manifest.json", "points.parquet"),
+    "a log": ("log.json", "motion.csv"),
+}
+
+
+@pytest.fixture(params=STORES)
 def store(request, tmp_path):
     """A folder that others read, which the command does not."""
-    name, what = request.param
     (tmp_path / "other").mkdir()
-    (tmp_path / "other" / name).write_text("{}")
-    return tmp_path / "other", what
+    for name in STORES[request.param]:
+        (tmp_path / "other" / name).write_text("{}")
+    return tmp_path / "other", request.param
 
 
 @pytest.mark.parametrize("inner", ["", "within"])
@@ -35,3 +42,10 @@ def test_a_result_in_another_store_is_refused(command, inner, store, world, tmp_
     told = f"{option}: expected a place outside {folder}, {what}, found "
     assert_refused(mapfilter(command, *given), told, "results need a folder of their own")
     assert contents(folder) == before
+
+
+@pytest.mark.parametrize("name", ["manifest.json", "log.json"])
+def test_files_of_other_programs_make_no_store(name, tmp_path):
+    """As a web page's manifest, above a folder for results."""
+    (tmp_path / name).write_text('{"name": "a page"}')
+    check_in_no_store(tmp_path / "out" / "view.html")

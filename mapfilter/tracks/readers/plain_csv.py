@@ -115,7 +115,7 @@ def read_columns(rows: Columns, reading: Reading, options: ReadOptions) -> None:
     reading.tallies.columns |= {
         field: column for field in _VITAL if (column := rows.find(*mapped.names(field))) is not None
     }
-    time_s = with_clock_set_right(times_of(mapped, reading, options), rows.line, reading)
+    time_s = with_clock_set_right(times_of(mapped, reading, options), rows, reading)
     reading.columns |= mapped.stated
     reading.columns |= {field: name.lower() for field, name in mapped.own.items()}
     reading.last_s = max([reading.last_s, *time_s[np.isfinite(time_s)][-1:].tolist()])

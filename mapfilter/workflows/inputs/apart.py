@@ -7,9 +7,9 @@ from pathlib import Path
 
 from mapfilter.config.fields import Section
 from mapfilter.config.sections import Config
-from mapfilter.database.checked import MANIFEST
+from mapfilter.database.manifest import MANIFEST, POINTS
 from mapfilter.errors import ConfigError, Faults, OutputError, fail
-from mapfilter.tracks.store import is_log
+from mapfilter.tracks.store import has_tables, is_log
 
 _ALSO_WRITTEN = (
     "output.dir",
@@ -71,14 +71,21 @@ def check_out_apart(out: Path, inputs: Sequence[Path], option: str = "--out") ->
 def check_in_no_store(out: Path, option: str = "--out") -> None:
     """Raise ConfigError where a result would lie in a database or a log, whoever reads it.
 
-    A database holds the files that it lists alone, and all of a log's folder is read.
+    A database holds the files that it lists alone, and all of a log's folder is read. Files of the
+    same names that other programs write, without tables beside them, make no store.
     """
     place = out.resolve()
     for folder in (place, *place.parents):
-        what = "a database" if (folder / MANIFEST).is_file() else "a log" if is_log(folder) else ""
-        if what:
+        if what := _store(folder):
             hint = "results need a folder of their own"
             raise fail(ConfigError, option, f"a place outside {folder}, {what}", str(out), hint)
+
+
+def _store(folder: Path) -> str:
+    """Return "a database", "a log", or "" for other folders."""
+    if (folder / MANIFEST).is_file() and (folder / POINTS).is_file():
+        return "a database"
+    return "a log" if is_log(folder) and has_tables(folder) else ""
 
 
 def check_inputs_kept(inputs: Iterable[Path], replaced: Iterable[Path]) -> None:
