@@ -259,7 +259,9 @@ def check_shapes(function: str, returned: Any, shapes: Mapping[str, tuple[int, .
     for name, shape in shapes.items():
         value = getattr(returned, name)
         try:
-            found = None if value is None else np.asarray(value, dtype=np.float64).shape
+            # NumPy reads texts of digits as numbers, and None as NaN.
+            is_other = value is None or np.asarray(value).dtype.kind in "US"
+            found = None if is_other else np.asarray(value, dtype=np.float64).shape
         except (TypeError, ValueError):
             found = None
         if found != shape:

@@ -62,6 +62,8 @@ WRONG = [
     ({"radii_m": [1.0, 2.0]}, "radii_m of shape (3,)", "shape (2,)"),
     ({"east_m": np.ones(1)}, "east_m as a number", "shape (1,)"),
     ({"north_m": None}, "north_m as a number", "None"),
+    ({"north_m": "3.0"}, "north_m as a number", "str"),
+    ({"radii_m": ["1", "2", "3"]}, "radii_m of shape (3,)", "list"),
 ]
 
 
