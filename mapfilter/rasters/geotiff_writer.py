@@ -16,8 +16,10 @@ from rasterio.errors import RasterioError
 from rasterio.io import DatasetWriter
 from rasterio.shutil import copy as copy_raster
 
+from mapfilter._arguments import shown
 from mapfilter._gdal import open_raster, reason_of
 from mapfilter._io import atomic_file
+from mapfilter._types import Floats
 from mapfilter.errors import InputError, MapfilterError, OutputError, fail, listed
 from mapfilter.lattice import Lattice
 from mapfilter.rasters.files import Quantity
@@ -127,7 +129,8 @@ def write_rasters(
     Raises
     ------
     InputError
-        An item is not the cell that is next, or has another shape; a cell has none.
+        An item is not the cell that is next, has another shape or no numbers; a cell has none, or
+        there is no cell.
     OutputError
         The file cannot be written.
     """
@@ -138,14 +141,14 @@ def write_rasters(
             raise fail(InputError, "levels", "an array of each cell", got)
         of_cells: Mapping[str, ArrayLike] = items
         items = ((cell_id, of_cells[cell_id]) for cell_id in cell_ids)
-    if cell_ids is None:
+    if cell_ids is None or len(cell_ids) == 0:
         raise fail(InputError, "cell_ids", "the ids of all cells", "none")
     bands = [(cell_id, "dBm" if quantity == "level" else "dB") for cell_id in cell_ids]
     tags = {**(tags or {}), QUANTITY_TAG: quantity}
     count, pixels = 0, hashlib.sha256()
     with new_geotiff(Path(path), lattice, bands, tags, overviews="average") as target:
-        for count, (cell_id, given) in enumerate(items, start=1):
-            values = np.ma.asarray(given, dtype=np.float64).filled(np.nan)
+        for count, item in enumerate(items, start=1):
+            cell_id, values = _band(item, count)
             expected = cell_ids[count - 1] if count <= len(cell_ids) else "no more cells"
             if cell_id != expected:
                 raise fail(InputError, f"band {count}", repr(expected), repr(cell_id))
@@ -159,6 +162,19 @@ def write_rasters(
         if count < len(cell_ids):
             raise fail(InputError, "bands", f"{len(cell_ids)} cells", f"{count}")
         target.update_tags(**{_PIXELS_TAG: pixels.hexdigest()})
+
+
+def _band(item: Any, number: int) -> tuple[str, Floats]:
+    """Return the cell of an item, and its values; NaN where they are masked."""
+    if not isinstance(item, tuple | list) or len(item) != 2:
+        raise fail(InputError, f"band {number}", "a cell id and its array", shown(item))
+    cell_id, given = item
+    try:
+        values: Floats = np.ma.asarray(given, dtype=np.float64).filled(np.nan)
+    except (TypeError, ValueError) as error:
+        where = f"band {number} ({cell_id})"
+        raise fail(InputError, where, "rows of numbers", shown(given)) from error
+    return cell_id, values
 
 
 def is_as_written(path: Path) -> bool:

@@ -100,6 +100,10 @@ def test_levels_by_cell_need_no_list_of_cells(tmp_path):
             "levels: expected an array of each cell, found none of B",
         ),
         ([("A", np.zeros((2, 3)))], None, "cell_ids: expected the ids of all cells, found none"),
+        ({}, None, "cell_ids: expected the ids of all cells, found none"),
+        (np.zeros((1, 2, 3)), ["A"], "band 1: expected a cell id and its array, found ndarray"),
+        ({"A": [["x"] * 3] * 2}, None, r"band 1 \(A\): expected rows of numbers, found list"),
+        ({"A": [[1, 2, 3], [4, 5]]}, None, r"band 1 \(A\): expected rows of numbers, found list"),
     ],
 )
 def test_cells_without_levels_and_levels_without_cells_are_named(items, ids, expected, tmp_path):
