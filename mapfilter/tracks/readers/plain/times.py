@@ -66,8 +66,9 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
     Of several columns of times one in UTC goes first, then one of local times.
     """
     # Dates are no numbers; notes on them may be of the columns that are looked at, too.
-    as_numbers = tuple(f"{name}: " for name in mapped.names("time"))
+    names = mapped.names("time")
     mapped = _best_column(mapped, reading)
+    as_numbers = tuple(f"{name}: " for name in {*names, *mapped.names("time")})
     missing = mapped.rows.flags(*mapped.names("time"), true=MISSING)
     if missing.size and missing.all():
         # A part of a large file, as of a receiver without a fix: the clock is that of the others.
