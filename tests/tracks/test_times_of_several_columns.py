@@ -63,3 +63,11 @@ def test_all_parts_of_a_large_file_have_the_times_of_one_column(
         note.startswith((f"{used}: ", f"columns not used: {used}")) for note in found.notes
     )
     assert any(note.startswith(f"columns not used: {unused}") for note in found.notes)
+
+
+def test_seconds_of_gps_since_1980_do_not_replace_those_that_count(tmp_path):
+    """Taken for Unix times they are of 2016."""
+    since_1980_s = START_S - 315_964_800 + 18 + ELAPSED_S
+    found = read(tmp_path, {"time": ELAPSED_S, "GPS time [s]": since_1980_s})
+    assert found.clock.kind == "monotonic"
+    np.testing.assert_allclose(found.tables["positions"]["time_s"], ELAPSED_S)
