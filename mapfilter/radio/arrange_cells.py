@@ -165,7 +165,7 @@ def _pick(
 
 
 def _places_of(headings: Sequence[Heading], field: str, names: Sequence[str]) -> list[int]:
-    """Return which headings are of a field; in another language one, and no height above the sea."""
+    """Return which headings are of a field; translated one alone, and no height above the sea."""
     found = places_named(headings, field, names)
     if not found or not _is_translated(field, headings[found[0]]):
         return found
