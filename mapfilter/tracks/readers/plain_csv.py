@@ -115,7 +115,7 @@ def read_columns(rows: Columns, reading: Reading, options: ReadOptions) -> None:
     reading.tallies.columns |= {
         field: column for field in _VITAL if (column := rows.find(*mapped.names(field))) is not None
     }
-    time_s = with_clock_set_right(times_of(mapped, reading, options), rows, reading)
+    time_s = with_clock_set_right(times_of(mapped, reading, options), mapped, reading)
     # Of several columns of times the one that was read, also in later parts.
     best = {"time": reading.columns["time"]} if "time" in reading.columns else {}
     if best and best["time"] not in mapped.names("time"):
