@@ -36,7 +36,8 @@ class EqualByValue:
 
     def __hash__(self) -> int:
         own: Any = self
-        return hash((type(self), *(_hashable(getattr(own, one.name)) for one in fields(own))))
+        values = (getattr(own, one.name) for one in fields(own) if one.compare)
+        return hash((type(self), *map(_hashable, values)))
 
 
 def _hashable(value: Any) -> Any:

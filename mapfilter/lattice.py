@@ -92,7 +92,7 @@ class Lattice:
     ) -> Lattice:
         """Return the lattice over west, south, east, north (m), snapped out to the resolution."""
         west, south, east, north = checked_bounds(bounds_m, "lattice")
-        if not (np.isfinite(resolution_m) and resolution_m > 0):
+        if not (_is_finite(resolution_m) and resolution_m > 0):
             got = f"{bounds_m} m at {resolution_m} m"
             raise fail(InputError, "lattice", "finite bounds and a resolution > 0", got)
         first_col, last_col = np.floor(west / resolution_m), np.ceil(east / resolution_m)

@@ -32,13 +32,13 @@ from mapfilter.filters.contract import (
     Status,
     UpdateInfo,
 )
-from mapfilter.positioning.custom_filter import ADVICE
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.filter import Filter
 from mapfilter.positioning.locators import as_filter
 from mapfilter.positioning.loop import estimate_of, kinds_of, locate, usable_part
 from mapfilter.positioning.merging import epochs
 from mapfilter.positioning.step_output import StepOutput
+from mapfilter.positioning.user_errors import ADVICE
 from mapfilter.tracks.log import TrackLog
 
 _ROUNDING = 1e-9

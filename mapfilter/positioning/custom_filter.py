@@ -11,21 +11,16 @@ from __future__ import annotations
 
 import hashlib
 import inspect
-import sys
-import traceback
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from mapfilter.database.radioroutes import RadioRouteDatabase
-from mapfilter.errors import ConfigError, MapfilterError, fail
+from mapfilter.errors import ConfigError, fail
 from mapfilter.filters.contract import (
     PLACE_SHAPES,
     Estimate,
@@ -41,9 +36,7 @@ from mapfilter.positioning.candidate import cell_points, startable
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind, Smoother
 from mapfilter.positioning.step_output import Fix, StepOutput
-
-ADVICE = "mapfilter.testing.check_filter names the clause of the contract that it breaks"
-"""Hint of errors in the code of a custom filter."""
+from mapfilter.positioning.user_errors import fault_text, file_of, module_of, wrap_user_errors
 
 _ALONE = ("time_s", "mass_50m", "way_probability", "radius_99_m", "protection_m")
 _FIX_SHAPES: Mapping[str, tuple[int, ...]] = PLACE_SHAPES | dict.fromkeys(_ALONE, ())
@@ -130,7 +123,7 @@ filter of a database, found float
     found = _imported(name)
     if isinstance(found, type):
         _check_functions(name, found)
-    file = _file(inspect.getmodule(found) or _module(name))
+    file = file_of(inspect.getmodule(found) or module_of(name))
     text = file.read_bytes() if file is not None and file.is_file() else b""
     return CustomFilter(name, hashlib.sha256(text).hexdigest())
 
@@ -148,7 +141,7 @@ def _imported(name: str) -> Any:
             ConfigError,
             f"filter {name}",
             "a filter that can be imported as package.module:Name",
-            _fault_text(error),
+            fault_text(error),
             hint if isinstance(error, ModuleNotFoundError) else "",
         ) from error
     if not callable(found):
@@ -167,57 +160,6 @@ def _check_functions(name: str, found: object) -> None:
 
 def _lacking(found: object, names: tuple[str, ...]) -> list[str]:
     return [one for one in names if not callable(getattr(found, one, None))]
-
-
-@contextmanager
-def wrap_user_errors(name: str, owner: object = None) -> Iterator[None]:
-    """Name the file and line of an error in a filter's code; the cause keeps the traceback.
-
-    Of what a function returns against the contract, the function is named.
-
-    Parameters
-    ----------
-    owner : object
-        The filter, or its class, where the name is not that of a module.
-
-    Raises
-    ------
-    ConfigError
-        In place of any error that is not ours.
-    """
-    try:
-        yield
-    except MapfilterError:
-        raise
-    except ReturnTypeError as error:
-        where = f"filter {name}, {error.function}"
-        raise fail(ConfigError, where, f"it to return {error.expected}", error.got) from error
-    except Exception as error:
-        # The last line outside of libraries is most likely the user's own.
-        frames, file = (
-            traceback.extract_tb(error.__traceback__),
-            _file(
-                _module(name)
-                or inspect.getmodule(owner if isinstance(owner, type) else type(owner))
-            ),
-        )
-        own = [frame for frame in frames if file is not None and Path(frame.filename) == file]
-        at = (own or list(frames))[-1]
-        where = f"filter {name}, {Path(at.filename).name} line {at.lineno}, in {at.name}"
-        raise fail(ConfigError, where, "a filter that runs", _fault_text(error), ADVICE) from error
-
-
-def _fault_text(error: BaseException) -> str:
-    return " ".join(f"{type(error).__name__}: {error}".split())
-
-
-def _module(name: str) -> ModuleType | None:
-    return sys.modules.get(name.partition(":")[0])
-
-
-def _file(module: ModuleType | None) -> Path | None:
-    file = getattr(module, "__file__", None)
-    return Path(file) if file else None
 
 
 def adapted(

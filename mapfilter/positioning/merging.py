@@ -10,10 +10,16 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._arguments import Argument, check_arguments
+from mapfilter.errors import InputError, fail
 from mapfilter.filters.contract import MotionStep
-from mapfilter.geodesy import projected_crs
+from mapfilter.geodesy import projected_crs, short_crs
 from mapfilter.positioning.epochs import Difference, Epoch, GnssFix, Pseudorange, ReportRow
-from mapfilter.tracks.checks.placeless import in_frame
+from mapfilter.tracks.checks.placeless import (
+    LOCAL_FRAME,
+    LOCAL_FRAME_HINT,
+    in_frame,
+    is_local_frame,
+)
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.schema import SCHEMA, TABLES
 
@@ -35,14 +41,15 @@ def epochs(log: TrackLog, crs: str = "") -> list[Epoch]:
     ConfigError
         It is no log, or the CRS no text.
     InputError
-        The CRS is none, or covers none of the positions.
+        The CRS is none, or covers none of the positions; or the log cannot be projected: it is in a
+        local frame, or has headings and no position.
     """
     check_arguments(
         "epochs",
         Argument("log", log, TrackLog, "a log of read_log or make_log"),
         Argument("crs", crs, str, "a CRS such as database.lattice.crs"),
     )
-    log = in_frame(log, projected_crs(crs, "epochs, crs")) if crs else log
+    log = _placed(log, projected_crs(crs, "epochs, crs")) if crs else log
     tables = {_FIELDS[name]: _by_time(log, name) for name, table in TABLES.items() if table.kinds}
     ahead = dict.fromkeys(tables, 0)
     merged = []
@@ -55,6 +62,18 @@ def epochs(log: TrackLog, crs: str = "") -> list[Epoch]:
                 ahead[one] = k + 1
         merged.append(Epoch(time_s, **fields_now))
     return merged
+
+
+def _placed(log: TrackLog, crs: str) -> TrackLog:
+    """Return a log in a CRS; InputError where it cannot be projected."""
+    placed = in_frame(log, crs)
+    if placed.crs != crs:
+        got, hint = LOCAL_FRAME, LOCAL_FRAME_HINT
+        if not is_local_frame(log.crs):
+            got = f"headings in {short_crs(log.crs)}, and no position by which they turn"
+            hint = "mf.locate turns them by the place of the database"
+        raise fail(InputError, "epochs, log", short_crs(crs), got, hint)
+    return placed
 
 
 def epoch_columns(table: str) -> tuple[str, ...]:

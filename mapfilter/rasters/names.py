@@ -29,7 +29,8 @@ def named_by_plan(rasters: RxLevRasters, plan: CellPlan) -> RxLevRasters:
     RxLevRasters
         With a note where names changed; ``check_against_plan`` finds the names that do not fit.
     """
-    ids = _by_form((*plan.ids, *plan.inactive))
+    # A cell may have rows that are switched off beside others; such rows may have no name.
+    ids = _by_form(dict.fromkeys((*plan.ids, *filter(None, plan.inactive))))
     rasters = _composed(rasters, ids)
     held = rasters.cell_ids
     if not held or any(cell_id in plan for cell_id in held):

@@ -44,7 +44,7 @@ FORMATS: Mapping[str, Opener] = {
 """Formats of raster files by suffix. A new one needs its module and a line here."""
 _MOST_FILES = 100_000
 _FEW_FILES = 3
-"""Files with the same fault are told one by one; of more the first ones are named."""
+"""Files with the same fault are reported one by one; of more the first ones are named."""
 
 
 def open_rasters(

@@ -113,15 +113,20 @@ def _column(name: str, given: Any, kind: type[np.generic], faults: Faults) -> ND
     elif found.dtype == kind:
         return found
     elif not issubclass(kind, np.integer):
-        if found.dtype.kind in "biuf":
+        other = kind is np.bool_ and ~np.isin(found, (0, 1))
+        if found.dtype.kind not in "biuf":
+            faults.add(where, "numbers", _kind_of(found))
+        elif np.any(other):
+            faults.add(where, "true or false", found[other][0])
+        else:
             return found.astype(kind)
-        faults.add(where, "numbers", _kind_of(found))
     elif found.dtype.kind not in "iuf":
         faults.add(where, "whole numbers", _kind_of(found))
     else:
         broken = ~np.isfinite(found) | (found != np.floor(found))
         limits = np.iinfo(kind)
-        beyond = (found < limits.min) | (found > limits.max)
+        # As a float the largest number of 64 bits is one more than that.
+        beyond = (found < limits.min) | (found >= limits.max + 1)
         if not broken.any() and not beyond.any():
             return found.astype(kind)
         expected = "whole numbers" if broken.any() else f"whole numbers of {kind.__name__}"

@@ -1,11 +1,13 @@
 """Values of epochs are equal where all that they hold is, whichever NaN that is."""
 
 import ast
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 
 import mapfilter
+from mapfilter._same import EqualByValue
 from mapfilter.filters.contract import MotionStep
 from mapfilter.positioning.epochs import Difference, Epoch, GnssFix, Pseudorange, ReportRow
 
@@ -50,6 +52,17 @@ def test_what_is_unknown_in_both_is_equal_and_has_one_hash():
 def test_what_differs_in_one_value_or_kind_does_not(one, other):
     assert one != other
     assert not one == other  # noqa: SIM201  both operators are asked
+
+
+@dataclass(frozen=True, eq=False)
+class Timed(EqualByValue):
+    east_m: float
+    took_s: float = field(compare=False)
+
+
+def test_what_is_not_compared_has_no_part_in_the_hash():
+    assert Timed(1.0, 2.0) == Timed(1.0, 3.0)
+    assert len({Timed(1.0, 2.0), Timed(1.0, 3.0)}) == 1
 
 
 def test_a_fix_repeats_one_with_the_same_unknown_errors():

@@ -249,3 +249,9 @@ def test_numbers_of_numpy_become_those_of_python():
 def test_bounds_that_are_no_four_numbers_are_named(bounds):
     with pytest.raises(InputError, match=r"lattice: expected west, south, east, north in metres"):
         Lattice.covering(CRS, bounds, 5.0)
+
+
+@pytest.mark.parametrize("resolution", ["5", None, np.inf, 0.0])
+def test_a_resolution_that_is_no_number_is_named(resolution):
+    with pytest.raises(InputError, match="lattice: expected finite bounds and a resolution > 0"):
+        Lattice.covering(CRS, (0, 0, 10, 10), resolution)

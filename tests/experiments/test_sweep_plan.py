@@ -211,6 +211,7 @@ def test_an_axis_of_a_grid_may_be_one_number():
         sigma_orient_deg=[3], scale=(0.1,)
     )
     assert len(noise_grid(np.array([0.0, 0.2]), np.float64(3.0))) == 2
+    assert noise_grid(np.array(0.2)) == noise_grid(0.2)
 
 
 @pytest.mark.parametrize(

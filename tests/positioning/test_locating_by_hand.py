@@ -95,7 +95,7 @@ def test_the_method_with_the_least_median_error_is_taken(monkeypatch):
         progress=lambda *given: done.append(given),
     )  # fmt: skip
     assert fitted.method == tested.CANDIDATES[1]
-    assert [one.median_m for one in fitted.validations] == [5.0, 7.0, 9.0]
+    assert [one.error_median_m for one in fitted.validations] == [5.0, 7.0, 9.0]
     assert {one.blocks for one in fitted.validations} == {"logs"}
     # Two folds of each of the three.
     assert done == [(k, 6) for k in range(1, 7)]

@@ -8,8 +8,10 @@ import pytest
 from cross_world import CRS, walk_log, walk_tables
 
 import mapfilter as mf
+from mapfilter.errors import InputError
 from mapfilter.geodesy import grid_convergence_rad, project, unproject
 
+LOCAL = "+proj=tmerc +lat_0=0 +lon_0=0 +type=crs"
 OTHERS = ("EPSG:32630", "EPSG:3763", "EPSG:23029")
 """The next zone, a national grid, and another datum, whose numbers differ by 200 m alone."""
 
@@ -158,3 +160,14 @@ def test_a_truth_that_was_projected_by_hand_is_taken_as_it_is(database, usual):
     by_hand = log.truth.assign(east_m=east_m, north_m=north_m)
     assert by_hand.attrs
     assert mf.score(track, by_hand).error_mean_m == pytest.approx(usual.error_mean_m, abs=0.5)
+
+
+def test_epochs_of_a_log_that_cannot_be_projected_are_refused():
+    log = stated_in("EPSG:32630")
+    headed = mf.make_log(log.crs, motion=log.motion)
+    with pytest.raises(InputError, match="found headings in EPSG:32630, and no position"):
+        mf.epochs(headed, CRS)
+    own = mf.make_log(LOCAL, gnss=log.truth[["time_s", "east_m", "north_m"]])
+    with pytest.raises(InputError, match=f"expected {CRS}, found a local frame"):
+        mf.epochs(own, CRS)
+    assert len(mf.epochs(own)) == len(mf.epochs(own, LOCAL)) == len(own.gnss)

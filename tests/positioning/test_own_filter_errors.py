@@ -9,8 +9,9 @@ import pytest
 
 from mapfilter.errors import ConfigError, InputError, StoreError, fail
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.positioning.custom_filter import CustomEpochFilter, custom_filter, wrap_user_errors
+from mapfilter.positioning.custom_filter import CustomEpochFilter, custom_filter
 from mapfilter.positioning.step_output import Fix, StepOutput
+from mapfilter.positioning.user_errors import wrap_user_errors
 
 
 class Own:

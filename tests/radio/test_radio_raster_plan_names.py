@@ -162,3 +162,16 @@ def test_cells_that_the_plan_switches_off_are_told_as_that():
     # Also where files have more in their names than the cell.
     found = named_by_plan(rasters("HDS1A_1", "HDS1B_1"), off)
     assert found.cell_ids == ("S1A", "S1B")
+
+
+def test_a_cell_of_which_one_row_is_switched_off_still_names_its_raster():
+    """As a plan has with a carrier each, of which one is not yet on air, or two that are not."""
+    off = replace(plan("S1A"), inactive=("S1A", "S1B", "S1B"))
+    assert named_by_plan(rasters("HDS1A_1"), off).cell_ids == ("S1A",)
+    found = named_by_plan(rasters("HDS1A_1", "HDS1B_1"), off)
+    assert found.cell_ids == ("S1A", "S1B")
+
+
+def test_a_row_without_a_name_that_is_switched_off_names_no_raster():
+    off = replace(plan("S1A"), inactive=("",))
+    assert named_by_plan(rasters("odd"), off).cell_ids == ("odd",)

@@ -227,6 +227,10 @@ def test_columns_may_be_lists_and_arrays_of_any_whole_numbers():
         (3, [0, 70_000], "route lattice, way_class: expected whole numbers of int16, found 70000"),
         (0, [[3], [4]], r"route lattice, row: expected one dimension, found \(2, 1\)"),
         (5, ["x", "y"], "route lattice, distance_to_way_m: expected numbers, found text"),
+        (2, [2**63, 1], "route lattice, way_id: expected whole numbers of int64, found 9"),
+        (6, [0.5, 1], r"route lattice, on_square: expected true or false, found 0\.5"),
+        (6, [np.nan, 1], "route lattice, on_square: expected true or false, found nan"),
+        (6, ["x", "y"], "route lattice, on_square: expected numbers, found text"),
     ],
 )
 def test_columns_of_something_else_are_named(column, value, expected):

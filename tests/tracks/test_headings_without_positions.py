@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 import mapfilter as mf
+from mapfilter.errors import InputError
 from mapfilter.geodesy import project
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import Cell, CellPlan
@@ -85,7 +86,8 @@ def test_a_log_in_the_same_metres_by_another_name_is_one_of_the_area():
     assert found.crs == CRS
     pd.testing.assert_frame_equal(found.truth, log.truth)
     elsewhere = make_log("EPSG:2393", truth=places)
-    assert in_frame(elsewhere, CRS, (LAT, LON)) is elsewhere
+    with pytest.raises(InputError, match="expected positions that EPSG:32635 covers"):
+        in_frame(elsewhere, CRS, (LAT, LON))
 
 
 def test_turned_headings_are_wrapped_and_noted():

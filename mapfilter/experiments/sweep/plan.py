@@ -296,7 +296,8 @@ def _axis(name: str, given: object, faults: Faults) -> list[Any]:
     """Return the values of an axis of a grid, one or several."""
     values: list[Any] = [given]
     if not isinstance(given, str | Real) and isinstance(given, Iterable):
-        values = list(given)
+        # An array of no dimension is one number.
+        values = np.atleast_1d(given).tolist() if isinstance(given, np.ndarray) else list(given)
     wrong = [shown(one) for one in values if not isinstance(one, Real)]
     if wrong or not values:
         faults.add(f"noise_grid, {name}", "numbers", *(wrong[:1] or ["none"]))

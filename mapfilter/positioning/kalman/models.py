@@ -93,9 +93,10 @@ class KalmanOptions(Options):
     start_sd_m : float
         Assumed deviation of a start at the serving site, without fix and timing advance.
     start_parts : int
-        Parts along east and along north into which such a start is cut.
+        Parts along east and along north into which such a start is cut, and at most a start from a
+        fix of a larger deviation than ``start_spacing_m``.
     start_spacing_m : float
-        Distance between the parts of a start on a timing advance's circle.
+        Distance between the parts of a start on a timing advance's circle, or about such a fix.
     reach_m : float
         Farthest that a neighbour of unknown identity is searched for from the serving site by its
         carrier and BSIC; 63 steps of timing advance in GSM.
