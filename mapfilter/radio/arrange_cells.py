@@ -153,8 +153,7 @@ def _pick(
             faults.add(f"{table.path} header", f"a column {name} ({field})", got, hint)
     faults.raise_if_any(InputError)
     for field, names in LAYOUTS[layout].items():
-        at = places_named(headings, field, names)
-        if at and not _is_ambiguous(field, [headings[one] for one in at]):
+        if at := _places_of(headings, field, names):
             picked.setdefault(field, tuple(at if field in ALIASES else at[:1]))
     if {"lat", "lon", "east", "north"} <= picked.keys():
         surplus = ("lat", "lon") if {"east", "north"} & columns.keys() else ("east", "north")
@@ -165,10 +164,14 @@ def _pick(
     return picked
 
 
-def _is_ambiguous(field: str, found: Sequence[Heading]) -> bool:
-    """Return whether headings in another language are several of a field, or mean another one."""
-    translated = _is_translated(field, found[0])
-    return translated and (len(found) > 1 or found[0].is_above_sea)
+def _places_of(headings: Sequence[Heading], field: str, names: Sequence[str]) -> list[int]:
+    """Return which headings are of a field; translated one alone, and no height above the sea."""
+    found = places_named(headings, field, names)
+    if not found or not _is_translated(field, headings[found[0]]):
+        return found
+    others = [Heading.of("") if one.is_above_sea else one for one in headings]
+    found = places_named(others, field, names)
+    return found if len(found) == 1 else []
 
 
 def _is_translated(field: str, heading: Heading) -> bool:

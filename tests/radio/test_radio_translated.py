@@ -92,6 +92,15 @@ def test_two_names_of_one_field_are_both_left_out(tmp_path):
     assert told in plan.notes
 
 
+@pytest.mark.parametrize("sea_first", [False, True])
+def test_a_height_above_the_sea_beside_that_of_the_antenna_is_not_read(sea_first, tmp_path):
+    """Where it came first, neither was read."""
+    names = ["Hauteur (m)", "Hauteur (m NGF)"]
+    text = FRENCH.replace("Hauteur (m);Azimut (°)", ";".join(names[::-1] if sea_first else names))
+    plan = read(tmp_path, text)
+    assert plan["K1"].height_m == (120.0 if sea_first else 32.0)
+
+
 def test_an_english_name_goes_before_a_translated_one(tmp_path):
     plan = read(tmp_path, FRENCH.replace("PIRE (dBm)", "Height (m)"))
     assert plan["K1"].height_m == 55.5

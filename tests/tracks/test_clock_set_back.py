@@ -72,11 +72,11 @@ SENSORS = pd.DataFrame({"time": np.arange(5, COUNT), "steps": 2 * np.arange(5, C
 FIXES = WALK[["time", "latitude", "longitude"]]
 
 
-@pytest.mark.parametrize("named", [False, True])
-def test_series_of_which_the_second_begins_later_are_no_clock(tmp_path, named):
+@pytest.mark.parametrize("names", [(np.nan, np.nan), ("gps", "network"), ("unit 1", "unit 2")])
+def test_series_of_which_the_second_begins_later_are_no_clock(tmp_path, names):
     """The first one was taken minutes earlier."""
+    named = isinstance(names[0], str)
     other = FIXES.iloc[5:] if named else SENSORS.assign(time=START_S + SENSORS["time"])
-    names = ("gps", "network") if named else (np.nan, np.nan)
     both = [one.assign(provider=name) for one, name in zip((FIXES, other), names, strict=True)]
     path = tmp_path / "both.csv"
     pd.concat(both).to_csv(path, index=False)
@@ -84,6 +84,15 @@ def test_series_of_which_the_second_begins_later_are_no_clock(tmp_path, named):
     assert not any("clock is set back" in note for note in found.notes)
     assert found.tables["positions"]["time_s"].min() == START_S
     assert found.tables["positions"]["time_s"].max() == START_S + COUNT - 1
+
+
+def test_exports_that_overlap_are_no_clock(tmp_path):
+    """Rows that both have were taken twice, and the first ones a minute earlier."""
+    path = tmp_path / "both.csv"
+    pd.concat([WALK.iloc[:250], WALK.iloc[190:]]).to_csv(path, index=False)
+    found = read_recording(path)
+    assert not any("clock is set back" in note for note in found.notes)
+    np.testing.assert_allclose(found.tables["positions"]["time_s"], WALK["time"])
 
 
 def test_a_clock_that_a_first_fix_sets_is_still_one(tmp_path):

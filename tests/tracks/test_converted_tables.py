@@ -7,6 +7,7 @@ import pytest
 from mapfilter.errors import InputError
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
+from mapfilter.tracks.readers.texts import text
 
 COUNT = 40
 TIME_S = 1_777_629_590.0 + np.arange(COUNT)
@@ -248,6 +249,16 @@ def test_degrees_with_their_sign_or_hemisphere_are_read(tmp_path, lat, lon, sign
     places = read(tmp_path, columns).tables["positions"]
     np.testing.assert_allclose(places["lat_deg"], sign * LAT, atol=1e-6)
     np.testing.assert_allclose(places["lon_deg"], sign * LON, atol=1e-6)
+
+
+def test_degrees_with_a_letter_are_noted_once_of_all_parts(tmp_path, monkeypatch):
+    """Each part of a large file has another first value."""
+    monkeypatch.setattr(text, "_PART_BYTES", 200)
+    columns = {"time": TIME_S, "lat": map("{:.6f} N".format, LAT), "lon": LON}
+    found = read(tmp_path, columns)
+    assert len(found.tables["positions"]) == COUNT
+    noted = [note for note in found.notes if "with a sign or a letter" in note]
+    assert noted == ["lat: degrees with a sign or a letter, as in 60.170000 N"]
 
 
 def test_letters_of_the_other_axis_are_no_degrees(tmp_path):

@@ -43,8 +43,8 @@ def way(time_s, east_m=0.0, north_m=0.0, **more):
     [
         (["GPS", "network", None, "gps"], [0, 3], "2 fixes of other providers than gps"),
         (["nlp", "FLP", "network"], [1], "2 fixes of other providers than flp"),
-        (["network", "nlp"], [0], "1 fixes of other providers than network"),
-        (["fused", "flp", "fused"], [0, 2], "1 fixes of other providers than fused"),
+        (["network", "nlp"], [0], "1 fix of other providers than network"),
+        (["fused", "flp", "fused"], [0, 2], "1 fix of other providers than fused"),
         (["gps", "gps"], [0, 1], ""),
         (["other", None], [0, 1], ""),
         ([None, None], [0, 1], ""),

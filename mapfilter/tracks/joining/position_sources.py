@@ -38,9 +38,9 @@ def measured_positions(recording: Recording) -> tuple[pd.DataFrame | None, str]:
     found = [name for name in PROVIDERS if (named == name).any()]
     if not found or (named == found[0]).all():
         return rows, ""
-    left = int((named != found[0]).sum())
+    left = number_of(int((named != found[0]).sum()), "fix", "fixes")
     kept = rows[named == found[0]].reset_index(drop=True)
-    return kept, f"{recording.path.name}: {left} fixes of other providers than {found[0]} left out"
+    return kept, f"{recording.path.name}: {left} of other providers than {found[0]} left out"
 
 
 def fixes_of(

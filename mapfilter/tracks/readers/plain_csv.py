@@ -115,8 +115,12 @@ def read_columns(rows: Columns, reading: Reading, options: ReadOptions) -> None:
     reading.tallies.columns |= {
         field: column for field in _VITAL if (column := rows.find(*mapped.names(field))) is not None
     }
-    time_s = with_clock_set_right(times_of(mapped, reading, options), rows, reading)
-    reading.columns |= mapped.stated
+    time_s = with_clock_set_right(times_of(mapped, reading, options), mapped, reading)
+    # Of several columns of times the one that was read, also in later parts.
+    best = {"time": reading.columns["time"]} if "time" in reading.columns else {}
+    if best and best["time"] not in mapped.names("time"):
+        mapped = replace(mapped, stated={**mapped.stated, **best})
+    reading.columns |= {**mapped.stated, **best}
     reading.columns |= {field: name.lower() for field, name in mapped.own.items()}
     reading.last_s = max([reading.last_s, *time_s[np.isfinite(time_s)][-1:].tolist()])
     add_places(mapped, reading, time_s, hemispheres)

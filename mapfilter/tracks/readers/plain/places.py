@@ -74,7 +74,8 @@ def with_bare_degrees(mapped: Mapped) -> Mapped:
             either = f"[{letter[0]}{letter[0].lower()}]{letter[1:]}"
             pattern = rf"^\s*([-+]?\d+(?:[.,]\d+)?)\s*°?\s*{either}\s*$"
             rows = rows.rewritten(pattern, rf"{sign}\1", name)
-        rows.reading.note(f"{name}: degrees with a sign or a letter, as in {found[0]}")
+        example = rows.reading.columns.setdefault(f"{field}, as in", found[0])
+        rows.reading.note(f"{name}: degrees with a sign or a letter, as in {example}")
     return replace(mapped, rows=rows)
 
 

@@ -66,8 +66,9 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
     Of several columns of times one in UTC goes first, then one of local times.
     """
     # Dates are no numbers; notes on them may be of the columns that are looked at, too.
-    as_numbers = tuple(f"{name}: " for name in mapped.names("time"))
+    names = mapped.names("time")
     mapped = _best_column(mapped, reading)
+    as_numbers = tuple(f"{name}: " for name in {*names, *mapped.names("time")})
     missing = mapped.rows.flags(*mapped.names("time"), true=MISSING)
     if missing.size and missing.all():
         # A part of a large file, as of a receiver without a fix: the clock is that of the others.
@@ -152,7 +153,9 @@ def _certainty(name: str, text: str) -> int:
     number = text.replace(",", ".")
     if _NUMBER.fullmatch(number):
         # Ticks since a phone was started are large, too.
-        return 3 if _EARLY_S < unix_seconds([float(number)])[0] < _LATEST_S else 1
+        seconds = float(unix_seconds([float(number)])[0])
+        sure = _EARLY_S < seconds < _LATEST_S and np.isnan(_since_1980(name, seconds))
+        return 3 if sure else 1
     time_s, zoned = parse_times(np.array([text], dtype=object), "UTC" if "utc" in name else "")
     return (3 if zoned else 2) if np.isfinite(time_s).all() else 0
 
@@ -249,16 +252,22 @@ def _local(reading: Reading, local_s: Floats, zone: str) -> Floats:
 
 def _note_gps(reading: Reading, name: str, known: Floats) -> None:
     """Note a column of GPS time whose numbers may count from 1980."""
-    if "gps" not in name or not known.size:
-        return
-    seconds = unix_seconds(known[:1])
-    of_gps = float(utc_from_gps_s(seconds)[0])
-    if seconds[0] < _RECENT_S and of_gps < _LATEST_S:
-        day, other = (f"{datetime.fromtimestamp(x, UTC):%Y-%m-%d}" for x in (seconds[0], of_gps))
+    seconds = float(unix_seconds(known[:1])[0]) if known.size else np.nan
+    of_gps = _since_1980(name, seconds)
+    if np.isfinite(of_gps):
+        day, other = (f"{datetime.fromtimestamp(x, UTC):%Y-%m-%d}" for x in (seconds, of_gps))
         reading.note(
             f"{name}: taken for Unix time ({day}); seconds of GPS since 1980 would be of {other}: "
-            f"--offset {reading.path.name}={of_gps - seconds[0]:.0f}"
+            f"--offset {reading.path.name}={of_gps - seconds:.0f}"
         )
+
+
+def _since_1980(name: str, seconds: float) -> float:
+    """Return the UTC seconds of a column of GPS time that may count from 1980; NaN for others."""
+    if "gps" not in name or not seconds < _RECENT_S:
+        return np.nan
+    of_gps = float(utc_from_gps_s(np.array([seconds]))[0])
+    return of_gps if of_gps < _LATEST_S else np.nan
 
 
 def _over_midnight(mapped: Mapped, reading: Reading, time_s: Floats) -> Floats:
