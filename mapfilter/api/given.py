@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from mapfilter._arguments import PATH, Argument
-from mapfilter.api.logs import read_log
+from mapfilter.api.logs import read_log, read_log_of_area
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.tracks.checks.placeless import in_frame
@@ -34,6 +34,12 @@ def opened(database: RadioRouteDatabase | Path | str) -> RadioRouteDatabase:
     return database if isinstance(database, RadioRouteDatabase) else open_database(database)
 
 
-def read(log: TrackLog | Path | str, crs: str) -> TrackLog:
+def read(
+    log: TrackLog | Path | str, crs: str, about_deg: tuple[float, float] | None = None
+) -> TrackLog:
     """Return a log in a CRS, see :func:`in_frame`; read where it is a path."""
-    return in_frame(log, crs) if isinstance(log, TrackLog) else read_log(log, crs=crs)
+    if isinstance(log, TrackLog):
+        return in_frame(log, crs, about_deg)
+    return (
+        read_log(log, crs=crs) if about_deg is None else read_log_of_area(log, crs, about_deg, {})
+    )

@@ -71,10 +71,11 @@ def locate_reports(
         keywords=[Setting("level_error_db", level_error_db, Positive)],
     )
     rng = generator("locate_reports", seed)
-    plan = None
+    plan, about_deg = None, None
     if isinstance(database, RadioRouteDatabase | str | os.PathLike):
         database = opened(database)
         known, plan = reports_of_database(database, level_error_db), database.plan
+        about_deg = database.lattice.middle_deg
     elif isinstance(database, Reports):
         known = database
     else:
@@ -83,7 +84,7 @@ def locate_reports(
         check_arguments("locate_reports", *each)
         known = reports_of_logs([in_frame(one, logs[0].crs) for one in logs])
     if not isinstance(log, Reports):
-        track = read(log, known.crs)
+        track = read(log, known.crs, about_deg)
         if plan is not None:
             track = with_range_notes(name_by_plan(track, plan), plan)
         log = reports_of_logs([track], plan)

@@ -178,6 +178,8 @@ def _inputs(
         known, plan = read_database(database, crs, level_error_db)
     except MapfilterError as error:
         faults.take(error)
+    if plan is not None:
+        options = replace(options, combine=replace(options.combine, about_deg=plan.middle_deg))
     try:
         query = read_reports(log, known.crs if known is not None else crs, plan, options)
     except MapfilterError as error:

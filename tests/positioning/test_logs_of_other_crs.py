@@ -130,6 +130,11 @@ def test_positions_that_a_crs_does_not_cover_are_left_out(tmp_path):
     assert any("gnss: 1 position left out: EPSG:32629 has no such" in note for note in moved.notes)
 
 
+def walk_log_with(levels_dbm):
+    log = walk_log()
+    return dataclasses.replace(log, radio=log.radio.assign(level_dbm=levels_dbm))
+
+
 def test_single_reports_of_a_log_in_another_crs(database):
     def reports(log):
         levels = np.where(log.radio["cell"] == "W", -60.0, -70.0)
@@ -140,6 +145,18 @@ def test_single_reports_of_a_log_in_another_crs(database):
     np.testing.assert_allclose(found[1].error_m, found[0].error_m, atol=1e-4)
     found = [mf.locate_reports(same, [same, one], "knn") for one in (same, other)]
     np.testing.assert_allclose(found[1].east_m, found[0].east_m, atol=1e-4)
+
+
+def test_single_reports_of_a_log_of_another_crs_need_no_positions(database, tmp_path):
+    """Headings, which they have no use for, kept the log in its CRS, and it was refused."""
+    log = stated_in("EPSG:32630")
+    levels = np.where(log.radio["cell"] == "W", -60.0, -70.0)
+    bare = mf.make_log(log.crs, motion=log.motion, radio=log.radio.assign(level_dbm=levels))
+    mf.write_log(bare, tmp_path / "log")
+    found, read = (mf.locate_reports(one, database, "knn") for one in (bare, tmp_path / "log"))
+    placed = mf.locate_reports(walk_log_with(levels), database, "knn")
+    np.testing.assert_allclose(found.east_m, placed.east_m, atol=1e-6)
+    np.testing.assert_allclose(read.east_m, placed.east_m, atol=1e-6)
 
 
 def test_epochs_are_in_the_crs_of_the_filter_that_takes_them():

@@ -130,6 +130,14 @@ def test_a_crs_with_the_metres_of_the_database(log, replay):
     assert assert_done(replay(log, "--json")).json["switched"] is True
 
 
+def test_single_reports_of_a_log_in_another_crs_need_no_positions(log, world, tmp_path):
+    (log / "truth.csv").unlink()
+    (log / "log.json").write_text('{"crs": "EPSG:2393"}')
+    given = ("--db", world.database, "--log", log, "--method", "centroid", "--json")
+    found = assert_done(mapfilter("locate", *given, "--out", tmp_path / "single"))
+    assert found.json["reports"] > 0
+
+
 def test_a_log_of_the_area_in_another_crs(log, replay, world, tmp_path):
     truth = pd.read_csv(log / "truth.csv")
     degrees = unproject("EPSG:32635", truth["east_m"], truth["north_m"])
