@@ -31,20 +31,17 @@ _FIELD_OF_UNIT = {
     "dbm": "level_dbm",
 }
 """Fields that a column whose name is of another language may be, by its unit."""
-_ENDS = {
-    "lat_deg": re.compile(r".*[._ :/](?:lat|latitude)"),
-    "lon_deg": re.compile(r".*[._ :/](?:lon|long|lng|longitude)"),
-    "time": re.compile(r".*time.*"),
-}
-"""Names of columns that only end in a usual name of a field, or hold it."""
+_ENDS = {"lat_deg": ("lat", "latitude"), "lon_deg": ("lon", "long", "lng", "longitude")}
+_PARTED = re.compile(r"[._ :/]")
+"""Last parts of names of columns, and what they are parted by."""
 _MESSAGES = "messages of an autopilot; export one kind: mavlogdump.py --format csv --types GPS"
 _LAYOUTS = (
     (
-        re.compile(r"type,\s*local number,\s*message,", re.IGNORECASE),
+        re.compile(r"\Atype,\s*local number,\s*message,", re.IGNORECASE),
         "all messages of a FIT file; export GPX, or its records alone (FitCSVTool --data record)",
     ),
-    (re.compile(r".*,mavlink_\w+_t,", re.IGNORECASE), _MESSAGES),
-    (re.compile(r"\d{4}-\d\d-\d\d [\d:.]+: \w+ \{TimeUS : "), _MESSAGES),
+    (re.compile(r",mavlink_\w", re.IGNORECASE), _MESSAGES),
+    (re.compile(r"\A\d{4}-\d\d-\d\d [\d:.]+: \w+ \{TimeUS : "), _MESSAGES),
 )
 """First lines of exports whose columns are no quantities, and what to do."""
 RAW_FRAMES = "raw frames of a bus; decode them by its DBC (cantools), export signals as CSV"
@@ -97,7 +94,7 @@ def unknown_format(
     separator = likely_separator(text.first_line)
     names = header_names(text.first_line, separator)
     is_table = len(names) > 1 and not text.first_line.lstrip().startswith(("{", "[", "<"))
-    known = (hint for layout, hint in _LAYOUTS if layout.match(text.first_line))
+    known = (hint for layout, hint in _LAYOUTS if layout.search(text.first_line))
     hint = NOT_READ.get(path.suffix.lower(), "") or next(known, "")
     hint = hint or _other_separators(path, text, find_format)
     if text.first_line.lstrip().startswith(JSON):
@@ -144,8 +141,8 @@ def other_names(names: Sequence[str]) -> str:
         if name not in likely and (unit := parted_unit(name)[1]) in _FIELD_OF_UNIT
     ]
     ended = {
-        field: next((name for name in others if end.fullmatch(parted_unit(name)[0])), "")
-        for field, end in _ENDS.items()
+        field: next((name for name in others if _ends_as(parted_unit(name)[0], field)), "")
+        for field in (*_ENDS, "time")
         if field not in found and not any(field in fields for fields in likely.values())
     }
     such += [shlex.quote(f"{field}={name}") for field, name in ended.items() if name]
@@ -159,6 +156,14 @@ def other_names(names: Sequence[str]) -> str:
         f"--column FIELD=COLUMN (track.columns in a configuration), such as {' and '.join(such)}"
     )
     return f"{times}a CSV with other names of columns: {option}"
+
+
+def _ends_as(name: str, field: str) -> bool:
+    """Return whether a column's name ends in a usual one of a field; of times, holds it."""
+    if field == "time":
+        return "time" in name
+    _, *others = _PARTED.split(name)
+    return bool(others) and others[-1] in _ENDS[field]
 
 
 def _pairs(name: str, fields: Sequence[str]) -> str:
