@@ -43,7 +43,7 @@ CHANGED = {
     "output": {"unused": ("other",)},
     "fix": {"radii_m": np.zeros(3)},
     "nowhere": {"radii_m": np.zeros(3)},
-    "truth": {"east_m": np.zeros(3)},
+    "truth": {"east_m": np.zeros(30)},
     "hypotheses": {"weight": np.array([1.0, 0.0])},
     "estimate": {"radii_m": np.array([1.0, 1.0, 2.0])},
 }

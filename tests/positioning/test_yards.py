@@ -71,3 +71,17 @@ def test_who_may_be_in_a_yard(last_mps, mean_mps, unit_m, status, cells, expecte
         watch=SimpleNamespace(pace=SimpleNamespace(last_mps=last_mps, speed_mps=mean_mps)),
     )
     assert off_nats_per_m(SimpleNamespace(model=model), state) == expected
+
+
+def test_a_stricter_map_still_refutes_a_position_off_the_roads():
+    """Of 2 nats a metre the null hypothesis pays what a vehicle's costs by default."""
+    model = SimpleNamespace(
+        weights=MapWeights(off_cost_per_m=2.0), area=SimpleNamespace(cell_ids=("A",))
+    )
+    pace = SimpleNamespace(last_mps=1.4, speed_mps=1.4)
+    state = SimpleNamespace(
+        belief=belief(TRACKING),
+        hold=SimpleNamespace(step_unit_m=1.0),
+        watch=SimpleNamespace(pace=pace),
+    )
+    assert off_nats_per_m(SimpleNamespace(model=model), state) == 0.15

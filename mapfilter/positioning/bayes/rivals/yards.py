@@ -13,6 +13,8 @@ from mapfilter.positioning.bayes.state import BayesState
 
 _SLOW_MPS = 6.0
 """Speed up to which one drives off the roads: 22 km/h."""
+_MOST_NATS_PER_M = 0.15
+"""What a metre off the roads costs a vehicle by default; a stricter map may still refute."""
 
 
 def off_nats_per_m(beliefs: BeliefFilters, state: BayesState) -> float:
@@ -31,4 +33,4 @@ def off_nats_per_m(beliefs: BeliefFilters, state: BayesState) -> float:
     pace, unit_m = state.watch.pace, state.hold.step_unit_m
     is_slow = unit_m * min(pace.last_mps, pace.speed_mps) <= _SLOW_MPS
     is_yard = is_slow and bool(beliefs.model.area.cell_ids)
-    return beliefs.model.weights.off_cost_per_m if is_yard else 0.0
+    return min(beliefs.model.weights.off_cost_per_m, _MOST_NATS_PER_M) if is_yard else 0.0
