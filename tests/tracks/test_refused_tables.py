@@ -119,7 +119,7 @@ def test_columns_whose_names_only_end_in_a_usual_one_are_proposed(tmp_path, head
         (
             "walk.csv",
             "Type,Local Number,Message,Field 1,Value 1,Units 1\nData,0,record,timestamp,1,s\n",
-            "all messages of a FIT file; export GPX, or its records alone (FitCSVTool --data",
+            "all messages of a FIT file; export GPX, or its records alone (FitCSVTool, data",
         ),
         (
             "bus.csv",
@@ -129,12 +129,12 @@ def test_columns_whose_names_only_end_in_a_usual_one_are_proposed(tmp_path, head
         (
             "flight.txt",
             "2026-05-01 10:00:00.00: GPS {TimeUS : 80221069, Status : 3, Lat : 42.3, Lng : 7.1}\n",
-            "mavlogdump.py --format csv",
+            "mavlogdump.py, types GPS",
         ),
         (
             "flight.csv",
             "5/1/2026 12:37:41 PM,FE,1E,13,mavlink_gps_raw_int_t,time_usec,306016000,lat,4\n",
-            "mavlogdump.py --format csv",
+            "mavlogdump.py, types GPS",
         ),
     ],
 )

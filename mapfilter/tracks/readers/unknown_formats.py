@@ -34,11 +34,11 @@ _FIELD_OF_UNIT = {
 _ENDS = {"lat_deg": ("lat", "latitude"), "lon_deg": ("lon", "long", "lng", "longitude")}
 _PARTED = re.compile(r"[._ :/]")
 """Last parts of names of columns, and what they are parted by."""
-_MESSAGES = "messages of an autopilot; export one kind: mavlogdump.py --format csv --types GPS"
+_MESSAGES = "messages of an autopilot; export one kind as CSV (mavlogdump.py, types GPS)"
 _LAYOUTS = (
     (
         re.compile(r"\Atype,\s*local number,\s*message,", re.IGNORECASE),
-        "all messages of a FIT file; export GPX, or its records alone (FitCSVTool --data record)",
+        "all messages of a FIT file; export GPX, or its records alone (FitCSVTool, data record)",
     ),
     (re.compile(r",mavlink_\w", re.IGNORECASE), _MESSAGES),
     (re.compile(r"\A\d{4}-\d\d-\d\d [\d:.]+: \w+ \{TimeUS : "), _MESSAGES),
