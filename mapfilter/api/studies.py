@@ -35,15 +35,8 @@ from mapfilter.api.python_words import python_words
 from mapfilter.api.swept import Sweep
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import ConfigError, Faults, fail
-from mapfilter.experiments.sweep.plan import (
-    AS_PREDICTED,
-    GYRO_ERRORS,
-    NO_TURNS,
-    NOISE_AXES,
-    Radio,
-    Reading,
-    SweepPlan,
-)
+from mapfilter.experiments.sweep.noises import GYRO_ERRORS, NO_TURNS, NOISE_AXES
+from mapfilter.experiments.sweep.plan import AS_PREDICTED, Radio, Reading, SweepPlan
 from mapfilter.experiments.sweep.run import sweep_runs
 from mapfilter.experiments.sweep.world import SweepWorld
 from mapfilter.options import Positive
@@ -98,7 +91,7 @@ def sweep(
         ``"my_module:MyFilter"``. Workers in processes of their own have to import it: one that is
         defined in a notebook runs in this process alone, also in its threads.
     noises : sequence of ImuNoise, or one, optional
-        See :func:`mapfilter.experiments.sweep.plan.noise_grid` for all combinations. Errors of a
+        See :func:`mapfilter.experiments.sweep.noises.noise_grid` for all combinations. Errors of a
         gyro may differ only where a custom filter uses turns (``turns="gyro"``).
     routes, draws : int
         Routes, and runs on each of them with every noise.

@@ -29,7 +29,7 @@ from mapfilter.evaluation.success_cells import (
     success_cells,
     varied_keys,
 )
-from mapfilter.experiments.sweep.plan import NOISE_AXES
+from mapfilter.experiments.sweep.noises import NOISE_AXES
 from mapfilter.experiments.sweep.run import run_batch, seconds_per_run, sweep
 from mapfilter.experiments.sweep.table import read_runs
 from mapfilter.report.canvas import Drawn

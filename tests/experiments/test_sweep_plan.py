@@ -12,13 +12,8 @@ from hypothesis import strategies as st
 
 from mapfilter.errors import ConfigError
 from mapfilter.experiments.sweep.journeys import filter_rng, imu_rng, radio_rng, route_rng
-from mapfilter.experiments.sweep.plan import (
-    LONGEST_BATCH,
-    Radio,
-    Reading,
-    SweepPlan,
-    noise_grid,
-)
+from mapfilter.experiments.sweep.noises import noise_grid
+from mapfilter.experiments.sweep.plan import LONGEST_BATCH, Radio, Reading, SweepPlan
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.positioning.custom_filter import CustomFilter
 from mapfilter.simulation.journeys import JourneyPlan

@@ -18,7 +18,8 @@ import pandas as pd
 from mapfilter.errors import ConfigError, fail
 from mapfilter.evaluation.success_cells import SuccessCell, success_cells
 from mapfilter.experiments.papers.paper import Paper, PaperSettings, Picture
-from mapfilter.experiments.sweep.plan import Radio, Reading, SweepPlan, noise_grid
+from mapfilter.experiments.sweep.noises import noise_grid
+from mapfilter.experiments.sweep.plan import Radio, Reading, SweepPlan
 from mapfilter.positioning.candidate import CandidateFilter
 from mapfilter.report.run_distributions import plot_run_distributions
 from mapfilter.report.success import (

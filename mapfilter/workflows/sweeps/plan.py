@@ -18,16 +18,8 @@ from mapfilter.config.sweep import ReadingSection
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail
-from mapfilter.experiments.sweep.plan import (
-    AS_PREDICTED,
-    GYRO_ERRORS,
-    NO_TURNS,
-    NOISE_AXES,
-    Radio,
-    Reading,
-    SweepPlan,
-    noise_grid,
-)
+from mapfilter.experiments.sweep.noises import GYRO_ERRORS, NO_TURNS, NOISE_AXES, noise_grid
+from mapfilter.experiments.sweep.plan import AS_PREDICTED, Radio, Reading, SweepPlan
 from mapfilter.experiments.sweep.world import SweepWorld, all_levels_dbm
 from mapfilter.filters.candidate import CandidateOptions
 from mapfilter.lattice import Lattice
