@@ -151,10 +151,19 @@ class Lattice:
         return (row >= 0) & (row < self.rows) & (col >= 0) & (col < self.cols)
 
     def window(self, row: int, col: int, rows: int, cols: int) -> Lattice:
-        """Return the part of this lattice that starts at (row, col), clipped to it."""
-        rows, cols = min(rows, self.rows - row), min(cols, self.cols - col)
-        west = self.west_m + col * self.resolution_m
-        north = self.north_m - row * self.resolution_m
+        """Return the part of this lattice that starts at (row, col), clipped to it on all sides.
+
+        Examples
+        --------
+        >>> lattice = Lattice("EPSG:32629", 500000.0, 4500010.0, 5.0, 4, 3)
+        >>> part = lattice.window(-1, 1, 3, 9)
+        >>> part.rows, part.cols, lattice.row_col(*part.east_north(0, 0))
+        (2, 2, (0, 1))
+        """
+        top, left = max(row, 0), max(col, 0)
+        rows, cols = min(row + rows, self.rows) - top, min(col + cols, self.cols) - left
+        west = self.west_m + left * self.resolution_m
+        north = self.north_m - top * self.resolution_m
         return Lattice(self.crs, west, north, self.resolution_m, rows, cols)
 
     def tiles(self, size_px: int) -> list[tuple[int, int, int, int]]:

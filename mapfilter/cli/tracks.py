@@ -117,6 +117,7 @@ def locate(
     ] = None,
     truth: TruthOption = None,
     zone: ZoneOption = None,
+    offset: OffsetOption = None,
     level_error_db: Annotated[
         float | None,
         typer.Option(
@@ -145,6 +146,7 @@ def locate(
             columns=column_map(column),
             zone=zone or "",
             truth=[given_path(path) or path for path in truth or ()],
+            offsets_s=clock_offsets(offset),
             level_error_db=level_error_db,
             seed=seed or 0,
             progress=progress,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapfilter._types import Bools, Floats, Floats32, Ints, Ints32
+from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.lattice import Lattice
 
@@ -50,6 +51,8 @@ class RouteLattice:
     attribution : str
         What the licence of the map asks for; a database that is built of the points keeps it, and
         pictures show it.
+    notes : tuple of str
+        What of the roads was left out, and settings that no way met.
     """
 
     lattice: Lattice
@@ -61,6 +64,7 @@ class RouteLattice:
     distance_to_way_m: Floats32
     on_square: Bools
     attribution: str = ""
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         faults = Faults()
@@ -85,7 +89,9 @@ class RouteLattice:
         return int(self.row.size)
 
     def __repr__(self) -> str:
-        return f"RouteLattice({len(self)} points, {len(self.class_names)} classes; {self.lattice})"
+        notes = f"; {number_of(len(self.notes), 'note')}" if self.notes else ""
+        size = f"{len(self)} points, {len(self.class_names)} classes"
+        return f"RouteLattice({size}; {self.lattice}{notes})"
 
     @property
     def point(self) -> Ints:

@@ -136,15 +136,17 @@ def read_routes(
         )
     map_file = roads if isinstance(roads, Path | str) and is_map(roads) else None
     attribution = "" if map_file is None else OSM_ATTRIBUTION
+    notes = *found.notes, *unused_classes(found.ways, half_width_by_class_m or {})
     if landuse is not None:
+        used = read_landuse(*landuse, lattice)
         classified = route_lattice_from_landuse(
-            read_landuse(*landuse, lattice).walkable,
+            used.walkable,
             lattice,
             clip_ways(found.ways, lattice.bounds_m),
             half_width_m,
             half_width_by_class_m=half_width_by_class_m,
         )
-        return replace(classified, attribution=attribution)
+        return replace(classified, attribution=attribution, notes=(*notes, *used.notes))
     here = lattice.crs, lattice.bounds_m
     if isinstance(buildings, bool | np.bool_):
         buildings = read_buildings(map_file, *here) if buildings and map_file else None
@@ -163,7 +165,7 @@ def read_routes(
         half_width_by_class_m=half_width_by_class_m,
         water=water,
     )
-    return replace(laid, attribution=attribution)
+    return replace(laid, attribution=attribution, notes=notes)
 
 
 class Roads(NamedTuple):

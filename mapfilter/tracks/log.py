@@ -104,6 +104,11 @@ class TrackLog(EqualByContent):
     imu: ImuNoise | None = None
     vehicle: bool | None = None
 
+    def __hash__(self) -> int:
+        """Return a hash of what is cheap to compare: equal logs have one hash."""
+        start_utc_s = self.start_utc_s if np.isfinite(self.start_utc_s) else None
+        return hash((self.crs, start_utc_s, *(len(getattr(self, table)) for table in TABLES)))
+
     def __repr__(self) -> str:
         """Return CRS, duration, start and the number of rows per table."""
         began = ""

@@ -16,7 +16,7 @@ from mapfilter._json_files import write_json
 from mapfilter._parallel import Progress
 from mapfilter._partial import nothing_left
 from mapfilter._types import Floats
-from mapfilter.errors import Faults, InputError, MapfilterError
+from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError
 from mapfilter.evaluation.accuracy import mean_of
 from mapfilter.lattice import Lattice
 from mapfilter.positioning.fingerprints.located import LocatedReports, figures_of
@@ -33,6 +33,7 @@ from mapfilter.report.cumulative import Distribution, axis_end_m, plot_cumulativ
 from mapfilter.report.saving import save
 from mapfilter.tracks.checks.misplaced import check_near
 from mapfilter.tracks.checks.placeless import is_local_frame
+from mapfilter.tracks.joining.named_files import offsets_by_path
 from mapfilter.tracks.open_options import OpenOptions
 from mapfilter.workflows.inputs.apart import (
     check_in_no_store,
@@ -94,6 +95,7 @@ def run_locate(
     columns: Mapping[str, str] | None = None,
     zone: str = "",
     truth: Sequence[Path] = (),
+    offsets_s: Mapping[str, float] | None = None,
     level_error_db: float | None = None,
     seed: int = 0,
     progress: Progress | None = None,
@@ -117,6 +119,8 @@ def run_locate(
         Where the log is a recording: zone of local times that state none.
     truth : sequence of Path
         Recordings whose positions are the truth of the log, a recording.
+    offsets_s : mapping of str to float, optional
+        Seconds to add to the times of a recording, by its name.
     level_error_db : float, optional
         Of the levels of a radio-route database; 6 when left out.
     seed : int
@@ -134,7 +138,10 @@ def run_locate(
     check_figures_of_reports(out)
     written = [out / name for name in (POSITIONS, FIGURES, PICTURE_OF_REPORTS)]
     check_inputs_kept([database, log, *truth], written)
-    combine = replace(WITHOUT_STEPS.combine, truth=tuple(truth))
+    faults = Faults()
+    shifts = offsets_by_path(offsets_s or {}, [log, *truth], "--offset", faults)
+    faults.raise_if_any(ConfigError)
+    combine = replace(WITHOUT_STEPS.combine, truth=tuple(truth), offsets_s=shifts)
     options = replace(WITHOUT_STEPS, zone=zone, columns=columns or {}, combine=combine)
     known, (reports, names) = _inputs(database, log, crs, level_error_db, options)
     rng = np.random.default_rng(seed)

@@ -134,6 +134,12 @@ def test_a_window_keeps_every_pixel_in_its_place(lattice, data):
 def test_a_window_beyond_the_lattice_is_told():
     with pytest.raises(InputError, match="at least one pixel"):
         LATTICE.window(40, 0, 5, 5)
+    with pytest.raises(InputError, match="at least one pixel"):
+        LATTICE.window(-5, 0, 5, 5)
+
+
+def test_a_window_that_begins_outside_is_clipped_as_one_that_ends_there():
+    assert LATTICE.window(-2, -1, 4, 3) == LATTICE.window(0, 0, 2, 2)
 
 
 @given(lattices(), st.integers(1, 70))

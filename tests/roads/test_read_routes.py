@@ -56,6 +56,15 @@ def test_a_map_with_its_buildings_and_water():
     assert not bare.on_square.any()
 
 
+def test_a_class_that_no_way_has_is_noted():
+    routes = read_routes("helsinki", MAP, half_width_by_class_m={"footwayy": 3.0})
+    assert routes.notes == (
+        "half_width_by_class_m: no way in the area is a 'footwayy'; did you mean 'footway'?",
+    )
+    assert repr(routes).endswith("; 1 note)")
+    assert read_routes("helsinki", MAP, half_width_by_class_m={"footway": 3.0}).notes == ()
+
+
 def test_points_of_a_map_state_its_source_and_a_database_of_them_keeps_it(tmp_path):
     routes = read_routes("helsinki", MAP)
     assert routes.attribution == "© OpenStreetMap contributors (ODbL)"

@@ -131,6 +131,16 @@ def test_more_steps_than_anybody_makes_since_the_last_one_are_a_jump(rest_s, tmp
     assert motion["time_s"][motion["step_m"].isna()].tolist() == [300 + rest_s]
 
 
+def test_a_jump_after_an_hour_at_rest_is_no_batch_of_all_of_it(tmp_path):
+    """8000 steps were spread over the hour in which the phone lay on a table."""
+    seconds = np.arange(3700.0)
+    walked = 2 * np.maximum(seconds - 3600, 0)
+    rows = {"time": START_S + seconds, "compass_deg": 0.0}
+    motion = read(tmp_path, rows | {"steps": walked + 8000 * (seconds >= 3600)}).motion
+    assert motion["time_s"][motion["step_m"].isna()].tolist() == [3600]
+    assert motion["step_m"].sum() == pytest.approx(STEP_M * walked[-1])
+
+
 def test_rows_of_cells_repeat_a_counter_and_are_no_batches(tmp_path):
     """A table with a row for each of four cells every 10 s has the same count in each."""
     time_s = np.repeat(SECONDS[::10], 4)

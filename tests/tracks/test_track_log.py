@@ -53,6 +53,13 @@ def test_absent_tables_are_empty_and_absent_fields_missing():
     assert log.truth_length_m == 0.0
 
 
+def test_equal_logs_have_one_hash():
+    motion = pd.DataFrame({"time_s": [0.0, 1.0], "step_m": [1.0, np.nan]})
+    logs = [make_log(CRS, motion=motion) for _ in range(2)]
+    assert logs[0] == logs[1]
+    assert len({*logs, make_log(CRS, motion=motion.iloc[:1])}) == 2
+
+
 def test_absent_tables_of_two_logs_are_not_one():
     first, second = make_log(CRS, motion=motion()), make_log(CRS, motion=motion())
     first.truth.loc[0, "east_m"] = 1.0

@@ -270,6 +270,33 @@ def test_a_recording_is_scored_by_another_one(tmp_path):
     assert not any("no zone" in note for note in found["notes"])
 
 
+def test_a_clock_of_the_truth_is_set_by_an_offset(tmp_path):
+    cells = write_upload(tmp_path / "cells.csv", 2, placed=False)
+    places = write_upload(tmp_path / "gps.csv")
+    zone = ["--zone", "+02:00"]
+    assert_done(mapfilter("convert", cells, "--truth", places, *zone, "--out", tmp_path / "db"))
+    late = pd.read_csv(places)
+    late["time"] = pd.to_datetime(late["time"]) + pd.Timedelta("300 s")
+    late.to_csv(tmp_path / "late.csv", index=False)
+    given = ["--db", tmp_path / "db", "--log", cells, "--out", tmp_path / "out", *zone, "--json"]
+    right = assert_done(mapfilter("locate", *given, "--truth", places)).json
+    given += ["--truth", tmp_path / "late.csv"]
+    mended = assert_done(mapfilter("locate", *given, "--offset", "late.csv=-300")).json
+    assert mended["error_mean_m"] == right["error_mean_m"]
+    wrong = mapfilter("locate", *given, "--offset", "lat.csv=-300")
+    assert_refused(wrong, "--offset: expected the name of one of the recordings (cells.csv, late.")
+    assert_refused(mapfilter("locate", *given, "--offset", "late.csv=soon"), "1 number")
+
+
+def test_a_track_log_takes_no_offset(folder, tmp_path):
+    given = ["--db", folder / "surveys", "--out", tmp_path / "out", "--log", folder / "walk"]
+    told = "a track log has the times of its tables"
+    outcome = mapfilter("locate", *given, "--offset", "walk=5")
+    assert_refused(outcome, "--offset: expected the name of one of the recordings, found 'walk'")
+    assert told in outcome.err
+    assert "parquet" not in outcome.err
+
+
 def test_truth_and_zone_are_those_of_one_recording(folder, tmp_path):
     places = write_upload(tmp_path / "gps.csv")
     given = ["--db", folder / "surveys", "--out", tmp_path / "out", "--truth", places]

@@ -5,7 +5,9 @@ import json
 import geopandas
 import numpy as np
 import pytest
+import rasterio
 import shapely
+from affine import Affine
 from command_line import assert_done, assert_refused, mapfilter
 
 from mapfilter.config.load import load_config
@@ -139,6 +141,19 @@ def test_half_widths_by_class_and_classes_that_no_way_has():
     names = np.array(streets.source.ways.ways.class_names)
     assert "footway" not in names[streets.source.ways.ways.way_class]
     assert any("no way in the area is a 'stepz'; did you mean 'steps'?" in n for n in streets.notes)
+
+
+def test_a_class_that_no_way_has_is_noted_beside_land_use(tmp_path):
+    transform = Affine(10, 0, WEST - 500, 0, -10, SOUTH + 900)
+    shape = {"height": 150, "width": 150, "count": 1, "dtype": "uint8"}
+    with rasterio.open(tmp_path / "u.tif", "w", crs=CRS, transform=transform, **shape) as target:
+        target.write(np.ones((150, 150), dtype=np.uint8), 1)
+    (tmp_path / "u.csv").write_text("value,class,walkable\n1,open,1\n")
+    names = {"landuse": "u.tif", "landuse_table": "u.csv"}
+    settings = [f"roads.{key}={tmp_path / name}" for key, name in names.items()]
+    given = [*BOX, *settings, "roads.half_width_by_class_m.stepz=2"]
+    notes = World.of(load_config(None, given)).streets.notes
+    assert any("no way in the area is a 'stepz'" in note for note in notes)
 
 
 def test_tracks_become_ways(tmp_path):

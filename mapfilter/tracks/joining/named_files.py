@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mapfilter.errors import Faults, listed
 from mapfilter.tracks.readers.texts.zipped import files_in_zip, is_zip
-from mapfilter.tracks.store import files_in
+from mapfilter.tracks.store import files_in, is_log
 
 _MOST_S = 1e10
 
@@ -23,7 +23,7 @@ def offsets_by_path(
     offsets_s : mapping of str to float
         Seconds to add to the times of a recording.
     paths : sequence of Path
-        Recordings, and folders or ZIPs of them.
+        Recordings, folders or ZIPs of them, and track logs, whose times have no offset.
     where : str
         The option or argument.
     """
@@ -34,8 +34,12 @@ def offsets_by_path(
     for name, seconds in offsets_s.items():
         named = [path for path in files if str(path) == name or path.name == name]
         if not named:
-            known = listed([path.name for path in files])
-            faults.add(where, f"the name of one of the recordings ({known})", repr(name))
+            expected, hint = "the name of one of the recordings", ""
+            if files:
+                expected += f" ({listed([path.name for path in files])})"
+            elif any(map(is_log, paths)):
+                hint = "a track log has the times of its tables; offsets are those of recordings"
+            faults.add(where, expected, repr(name), hint)
         elif not (isfinite(seconds) and abs(seconds) <= _MOST_S):
             faults.add(f"{where} {name}", f"seconds, at most {_MOST_S:g}", f"{seconds:g}")
         found.update(dict.fromkeys(named, float(seconds)))
@@ -60,6 +64,9 @@ def check_origin(origin_deg: tuple[float, float], where: str, faults: Faults) ->
 
 
 def _files_of(path: Path) -> list[Path]:
+    """Return the recordings of a path: tables of a track log are none."""
+    if path.is_dir() and is_log(path):
+        return []
     if path.is_dir():
         return files_in(path)
     return files_in_zip(path) if is_zip(path) else [path]

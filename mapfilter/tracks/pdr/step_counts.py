@@ -11,6 +11,8 @@ STEPS_PER_S = 5.0
 LATE_S, _JITTER = 10.0, 20.0
 """Counters are read up to so many seconds late; falls of fewer steps are of rows out of order."""
 _FALLING = 0.5
+_LATEST_S = 300.0
+"""Batches come at most so late: what a counter grows by after a longer rest is not of all of it."""
 PAUSE_S = 30.0
 """Time without a row after which steps are unknown."""
 _OWN_COUNTS = "counted in each row"
@@ -65,7 +67,7 @@ def counted_steps(time_s: Floats, count: Floats) -> tuple[Floats, Floats, str]:
         change, how = np.diff(_without_jitter(count)), "by a counter"
     lasted_s = np.diff(time_s)
     # Phones deliver batches: the steps are those of the time since the last ones.
-    most = STEPS_PER_S * np.maximum(_since_steps_s(time_s, change), LATE_S)
+    most = STEPS_PER_S * np.clip(_since_steps_s(time_s, change), LATE_S, _LATEST_S)
     walkable = (change >= 0) & (change <= most)
     # Where a counter is written only when it grows, a few steps end a long rest.
     paused = (lasted_s > PAUSE_S) & (change > _JITTER)

@@ -83,8 +83,8 @@ def read_reports(
     InputError
         With the faults of all logs.
     ConfigError
-        There is a zone, a column or a ground truth for what is no recording, or a zone or a ground
-        truth for several.
+        There is a zone, a column, an offset or a ground truth for what is no recording, or a zone,
+        an offset or a ground truth for several.
     """
     if not options.columns and _is_fingerprints(path):
         _check_recording(path, "a table of fingerprints", options)
@@ -123,6 +123,7 @@ def _check_recording(path: Path, got: str, options: OpenOptions) -> None:
     of_recordings = {
         "--zone": options.zone,
         "--truth": options.combine.truth,
+        "--offset": options.combine.offsets_s,
         "--column": options.columns,
     }
     for option, given in of_recordings.items():

@@ -118,10 +118,10 @@ class Streets:
     @property
     def notes(self) -> tuple[str, ...]:
         """Features left out or cut out, rasters resampled, and assumptions."""
-        if self.landuse is not None:
-            return self.landuse.notes
         roads, notes = self.config.roads, list(self._roads.notes)
         notes += unused_classes(self._roads.ways, roads.half_width_by_class_m)
+        if self.landuse is not None:
+            return (*notes, *self.landuse.notes)
         if self.gaps:
             notes.append(self.gaps)
         if roads.cut_buildings and len(self.buildings):
