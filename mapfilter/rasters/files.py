@@ -127,11 +127,13 @@ def as_stored(number: float, factor: float) -> str:
     --------
     >>> as_stored(-624.9375, 0.0625), as_stored(np.float32(-999.9), 0.1), as_stored(-60.1, 1.0)
     ('-9999', '-9999', '-60.1')
+    >>> as_stored(-9999.5, 1.0), as_stored(np.float32(-6000.55), 1.0), as_stored(-0.0, 0.1)
+    ('-9999.5', '-6000.55', '0')
     """
     exact = float(number) / factor
     # Single precision has rounded it; adding 0 turns -0 into 0.
     whole = float(round(exact)) + 0.0
-    is_whole = abs(exact - whole) < 1e-4 * max(1.0, abs(exact))
+    is_whole = abs(exact - whole) < 1e-6 * max(1.0, abs(exact))
     return f"{whole:.10g}" if is_whole else str(np.float32(exact))
 
 

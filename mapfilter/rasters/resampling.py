@@ -166,7 +166,7 @@ def _nearest(file: RasterFile, bands: Sequence[int], rows: Ints, cols: Ints) -> 
     done = 0
     while done < rows.size:
         top = int(rows[done])
-        part = rows[done : done + (int(np.searchsorted(rows[done:], top + step)) or 1)]
+        part = rows[done : done + int(np.searchsorted(rows[done:], top + step))]
         strip = file.read(bands, (top, left, int(part[-1]) - top + 1, width))
         if not (_without_gap(part) and _without_gap(cols)):
             strip = strip[:, (part - top)[:, None], cols - left]

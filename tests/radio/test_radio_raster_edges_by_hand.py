@@ -33,6 +33,8 @@ def numbers(*parts):
         ([-301, -50], (-301, 0.5)),
         ([-300, -50], None),
         ([-301, 50, 70], (-301, 1 / 3)),
+        ([-301, 0, 70], (-301, 1 / 3)),
+        ([-301, -302, 70], None),
         # A hundredth of zeros, below or above all of which the others are.
         (numbers((-80, 99), (0, 1)), (0, 0.01)),
         (numbers((-80, 100), (0, 1)), None),
@@ -50,6 +52,11 @@ def numbers(*parts):
         ([32_767, 100], (32_767, 0.5)),
         ([65_535, 100], (65_535, 0.5)),
         ([255, 255], (255, 1)),
+        # Whole numbers to a thousandth, and a millionth of themselves.
+        ([255, 255, 100.0005], (255, 2 / 3)),
+        ([255, 255, 100.0015], None),
+        ([65_535, 65_535, 20_000.0195], (65_535, 2 / 3)),
+        ([65_535, 65_535, 20_000.0235], None),
     ],
 )
 def test_one_number_beyond_all_levels(values, marker):

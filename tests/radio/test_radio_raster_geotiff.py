@@ -48,6 +48,7 @@ def placed(transform, known):
         (Affine(5, 0, 385000, 0, 5, 6673000), ["row 0 in the north, column 0 in the west; "]),
         (Affine(-5, 0, 385000, 0, -5, 6673000), ["row 0 in the north, column 0 in the west; "]),
         (Affine(5, 0, 385000, 0, 0, 6673000), ["row 0 in the north, column 0 in the west; "]),
+        (Affine(0, 0, 385000, 0, -5, 6673000), ["row 0 in the north, column 0 in the west; "]),
         (Affine(5, 0.1, 385000, 0, -5, 6673000), ["rows that run east; "]),
         (Affine(5, 0, 385000, 0.1, -5, 6673000), ["rows that run east; "]),
         (Affine(5, 0, np.nan, 0, -5, 6673000), ["finite numbers; "]),

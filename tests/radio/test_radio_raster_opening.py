@@ -62,6 +62,8 @@ def test_options_that_just_are(tmp_path):
     held = open_rasters(path, "level", factor=-0.5, nodata=np.inf, resolution_m=5.0)
     assert (held.factor, held.lattice, held.resampling) == (-0.5, LATTICE, "nearest")
     assert open_rasters(path, "level").factor == 1.0
+    fine = open_rasters(path, "level", resolution_m=0.5).lattice
+    assert (fine.rows, fine.cols, fine.resolution_m) == (60, 80, 0.5)
 
 
 def test_which_folders_hold_rasters(tmp_path):

@@ -77,6 +77,10 @@ def test_of_ids_within_ids_the_longest_are_taken():
     ids = ("A1", "A11", "1")
     found = named_by_plan(rasters("xA1y", "xA11y"), plan(*ids))
     assert found.cell_ids == ("A1", "A11")
+    # The longer id is the one that the name holds, whichever side it is longer on.
+    for names, longest in ((("xA1", "xA2"), ("A1", "A2")), (("1Ax", "2Ax"), ("1A", "2A"))):
+        found = named_by_plan(rasters(*names), plan("1", "2", *longest))
+        assert found.cell_ids == longest
     # An id that occurs twice in a name stands where the other names have theirs.
     found = named_by_plan(rasters("7_7", "7_8"), plan("7", "8"))
     assert found.cell_ids == ("7", "8")

@@ -158,6 +158,13 @@ def test_files_far_apart_or_of_two_systems():
     far = replace(LATTICE, west_m=385000.0 + 5e6, north_m=6673000.0 - 5e6)
     with pytest.raises(InputError, match="a raster of another place"):
         common_lattice([made(), made(far)], None, "nearest")
+    # Named is the one that the others are far from, on whichever side of them it lies.
+    for west_m, north_m in ((1e6, 1e6), (1e6, 12e6), (-6e6, 12e6)):
+        odd = replace(LATTICE, west_m=west_m, north_m=north_m)
+        files = [made(), made(odd, path=Path("rasters/odd.tif")), made()]
+        with pytest.raises(InputError) as caught:
+            common_lattice(files, 2.0, "nearest")
+        assert caught.value.faults[0].where == "rasters, with odd.tif"
     other = replace(LATTICE, crs="EPSG:32634")
     with pytest.raises(InputError, match="two systems mixed up"):
         common_lattice([made(), made(other)], None, "nearest")

@@ -90,6 +90,27 @@ def test_levels_are_those_of_the_pixels_under_the_points():
     assert len(second.reads) == 1
 
 
+@pytest.mark.parametrize("resampling", ["nearest", "bilinear"])
+@pytest.mark.parametrize("quantity", ["level", "loss"])
+@pytest.mark.parametrize("factor", [1.0, 2.0, 0.5])
+def test_levels_at_points_are_those_of_whole_windows(resampling, quantity, factor):
+    """Each read by itself, of files on two lattices, one of them between the pixels."""
+    between = Lattice(CRS, 385002.0, 6672999.0, 4.0, 14, 24)
+    files = [made("1", "AB"), made("2", "CD", between, seed=1)]
+    sign = -1 if quantity == "level" else 1
+    files = [replace(file, values=sign * file.values) for file in files]
+    held = replace(rasters(*files, quantity=quantity, factor=factor), resampling=resampling)
+    rng = np.random.default_rng(3)
+    asked = [
+        places(held, cells, window, rng.integers(0, window[2:], (5, 2)))
+        for cells, window in (("ABCD", (0, 0, 12, 20)), ("DB", (3, 4, 5, 6)), ("C", (4, 7, 5, 5)))
+    ]
+    for one, found in zip(asked, levels_at(asked), strict=True):
+        whole = held.read_levels_dbm(one.plan, one.window, one.cells)
+        np.testing.assert_array_equal(found, whole[:, one.row, one.col])
+        assert np.isfinite(found).any()
+
+
 def test_a_cell_without_a_raster_has_no_level():
     file = made("1", "AB")
     (found,) = levels_at([places(rasters(file), "CB", (0, 0, 2, 2), [(0, 0), (1, 1)])])
