@@ -64,6 +64,14 @@ def test_one_number_beyond_all_levels(values, marker):
     assert found == (None if marker is None else pytest.approx(marker))
 
 
+@pytest.mark.parametrize("factor", [0.1, 0.5, 2.0])
+def test_the_largest_of_a_type_is_one_as_stored(factor):
+    stored = np.float32([65_535, 65_535, 1000])
+    marker = pytest.approx((65_535 * factor, 2 / 3))
+    assert nodata_taken_as_level(stored * np.float32(factor), factor) == marker
+    assert nodata_taken_as_level(stored * np.float32(factor)) is None
+
+
 @pytest.mark.parametrize(
     ("usual", "number", "count", "near", "is_marker"),
     [

@@ -78,6 +78,13 @@ def test_which_folders_hold_rasters(tmp_path):
     assert not is_raster_folder(tmp_path / "A.ASC")
 
 
+def test_a_file_without_anything_in_it_is_no_raster(tmp_path):
+    for name in ("A.tif", "A.asc", "A.bil", "A.any"):
+        (tmp_path / name).touch()
+        assert faults(tmp_path / name, "level") == [f"{name}: a raster file"]
+    assert len(faults(tmp_path, "level")) == 3
+
+
 QUANTITIES = [
     (None, [("", "dBm"), ("", "dBm")], "level"),
     (None, [("loss", ""), ("", "dB")], "loss"),
