@@ -59,12 +59,12 @@ def test_a_step_is_a_swing_of_a_metre_and_a_half_per_square_second(hz, range_mps
         assert not ((weaker.index > 10 * RATE_HZ) & (weaker.index < 30 * RATE_HZ)).any()
 
 
-def steps_at(*at_s, weak=(), lasts_s=30.0):
+def steps_at(*at_s, weak=(), weak_mps2=3.5, lasts_s=30.0):
     """Return which of some steps are found: a bump of 0.4 s each; ``weak`` ones are lower."""
     time_s = np.arange(int(lasts_s * RATE_HZ)) / RATE_HZ
     force = np.full(time_s.size, 9.81)
     for n, one in enumerate(at_s):
-        size = 4.0 if n in weak else 16.0
+        size = weak_mps2 if n in weak else 16.0
         force += size * np.exp(-0.5 * ((time_s - one) / 0.12) ** 2)
     index = find_steps(force).index / RATE_HZ
     return [n for n, one in enumerate(at_s) if (np.abs(index - one) < 0.1).any()]
@@ -83,6 +83,7 @@ def test_a_step_has_a_third_of_what_those_beside_it_have():
     at_s = 5.0 + 0.9 * np.arange(15)
     assert steps_at(*at_s) == list(range(15))
     assert 7 not in steps_at(*at_s, weak=(7,))
+    assert 7 in steps_at(*at_s, weak=(7,), weak_mps2=4.0)
     # Among weak ones they are steps.
     assert steps_at(*at_s, weak=tuple(range(15))) == list(range(15))
 
