@@ -56,6 +56,30 @@ def test_soft_and_hard_steps_are_counted_within_five_percent(cadence_hz, rise_mp
     assert missed + added <= 0.055 * len(true_s)
 
 
+def test_options_of_a_walk_change_what_they_name():
+    """The mean length of steps, and where north is; all else is that of the sensors."""
+    sensors, _, _ = walk_sensors((Leg(12, 0.3, 2), Leg(10, 1.8)), Phone(seed=5))
+    usual = reckoned(sensors)
+    note = "no magnetic declination given: magnetic north taken for true north"
+    assert note in usual.notes
+    turned, _ = reckon_walk(sensors, WalkOptions(declination_deg=7.0, step_m=0.9), 0.05)
+    assert note not in turned.notes
+    lengths = stepped(turned)["step_m"].to_numpy()
+    assert lengths.mean() == pytest.approx(0.9)
+    np.testing.assert_allclose(
+        lengths / lengths[0], stepped(usual)["step_m"] / stepped(usual)["step_m"].iloc[0]
+    )
+    later_rad = turned.motion["heading_rad"] - usual.motion["heading_rad"]
+    expected_rad = 0.05 - np.radians(7.0)
+    assert apart_deg(later_rad, expected_rad).max() == pytest.approx(0.0, abs=1e-6)
+    pd.testing.assert_series_equal(turned.motion["turn_rad"], usual.motion["turn_rad"])
+    pd.testing.assert_series_equal(turned.motion["time_s"], usual.motion["time_s"])
+    assert turned.steps == usual.steps == len(lengths)
+    # A declination that is not known is an error of 8 degrees of all headings.
+    more_deg = np.sqrt(usual.imu.bias_sd_deg**2 - turned.imu.bias_sd_deg**2)
+    assert more_deg == pytest.approx(8.0)
+
+
 @settings(max_examples=12)
 @given(POSES, st.sampled_from([0.3, 0.8, 1.2]))
 def test_the_pose_of_the_phone_does_not_matter(pose, lead_rad):
