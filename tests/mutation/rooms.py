@@ -75,9 +75,15 @@ class Imports:
 
     def __init__(self, root: Path, package: str = "mapfilter") -> None:
         self._root, self._package = root, package
+        self._direct: dict[Path, frozenset[Path]] = {}
 
     def direct(self, file: Path) -> frozenset[Path]:
-        """Return the package's files that a file imports itself."""
+        """Return the package's files that a file imports itself; each is looked at once."""
+        if file not in self._direct:
+            self._direct[file] = self._imported(file)
+        return self._direct[file]
+
+    def _imported(self, file: Path) -> frozenset[Path]:
         found = set()
         for node in ast.walk(ast.parse((self._root / file).read_bytes())):
             if isinstance(node, ast.ImportFrom) and node.module and not node.level:

@@ -84,6 +84,22 @@ def test_what_is_no_position_is_told_with_its_row(column, row, value, told):
     assert told in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    ("column", "low", "high"),
+    [("lat_deg", -90, 90), ("lon_deg", -180, 180), ("accuracy_m", 0, 100_000)],
+)
+def test_each_range_ends_where_it_is_told_to(column, low, high):
+    for value, is_in in ((low, True), (high, True), (low - 0.001, False), (high + 0.001, False)):
+        given = positions(accuracy_m=5.0)
+        given.loc[1, column] = value
+        if is_in:
+            # At a pole, or on the other side of the earth, the zone has no coordinates.
+            assert len(make_log(CRS, gnss=given).gnss) >= len(given) - 1
+            continue
+        with pytest.raises(mf.MapfilterError, match=f"row 2, {column}: expected .*{low}..{high},"):
+            make_log(CRS, gnss=given)
+
+
 def test_degrees_beside_metres_are_not_used():
     given = positions(east_m=458_000.0, north_m=5_548_000.0)
     log = make_log(CRS, gnss=given)
