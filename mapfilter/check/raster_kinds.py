@@ -54,14 +54,18 @@ def falls_with_distance(sample: RasterSample, east_m: float, north_m: float) -> 
 
     1 is a raster that falls off evenly around it; 0 where nothing is known.
     """
-    east, north = sample.positions_m()
+    rows, cols = np.ogrid[: sample.lattice.rows, : sample.lattice.cols]
+    east, north = sample.lattice.east_north(rows, cols)
     known = ~np.isnan(sample.values)
     value = sample.values[known].astype(np.float64)
-    least_m = sample.lattice.resolution_m
-    far = -np.log10(np.maximum(np.hypot(east - east_m, north - north_m)[known], least_m))
-    if value.size < 2 or np.ptp(value) == 0 or np.ptp(far) == 0:
+    squared_m2 = ((east - east_m) ** 2 + (north - north_m) ** 2)[known]
+    # Twice the logarithm, which correlates alike.
+    near = -np.log10(np.maximum(squared_m2, sample.lattice.resolution_m**2))
+    if value.size < 2 or np.ptp(value) == 0 or np.ptp(near) == 0:
         return 0.0
-    return float(np.corrcoef(value, far)[0, 1])
+    value -= value.mean()
+    near -= near.mean()
+    return float((value @ near) / np.sqrt((value @ value) * (near @ near)))
 
 
 def above_free_space_db(sample: RasterSample, cell: Cell) -> float:
