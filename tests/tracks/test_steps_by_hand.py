@@ -171,6 +171,10 @@ def test_enough_of_a_track_is_in_common():
     assert np.isnan(median_apart_m(one, other, -51.0, 0.5))
     assert np.isfinite(median_apart_m(one, other, 98.0, 0.0))
     assert np.isnan(median_apart_m(one, other, 99.0, 0.0))
+    # Exactly the share that is asked for is enough: 50 of 100 rows.
+    even = tuple(values[:100] for values in other)
+    assert np.isfinite(median_apart_m(one, even, 51.0, 0.5))
+    assert np.isnan(median_apart_m(one, even, 52.0, 0.5))
     far = later(other, 5000.0)
     assert best_place_shift(one, far, np.arange(-5.0, 6.0)) == (0.0, float("inf"))
     # Of a short recording beside a long one the share is that of what there can be.
