@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import radians, sqrt
+from math import sqrt
 
 import numpy as np
 
-from mapfilter.angles import wrap_one_rad, wrap_rad
+from mapfilter.angles import wrap_rad
 from mapfilter.filters.contract import Status
 from mapfilter.filters.grid import GridBelief
 from mapfilter.filters.particle import ParticleBelief
@@ -53,7 +53,7 @@ def turned_at_jump(
     """
     if isinstance(belief, GridBelief):
         return belief
-    around = abs(wrap_one_rad(changed_rad)) > radians(rules.around_deg)
+    around = rules.is_around(changed_rad)
     probability = rules.around_probability if around else rules.probability
     chosen = rng.random(belief.log_weight.size) < probability
     state = belief.state.copy()
