@@ -1,7 +1,7 @@
 """Half turns of a journey that were the walker's, and the odds of the next one."""
 
 from dataclasses import replace
-from math import exp, log, pi
+from math import exp, log, pi, radians
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +10,8 @@ from made_filters import SEARCHING, STATE, TRACKING, Beliefs, belief, gaining, w
 from made_filters import rival as alternative
 
 from mapfilter.filters.contract import MotionStep
-from mapfilter.models.street_motion import BIAS, STATES
+from mapfilter.models.street_motion import BIAS, STATES, MotionErrors
+from mapfilter.positioning.bayes.beliefs.belief_changes import turned_at_jump
 from mapfilter.positioning.bayes.beliefs.moving import moved
 from mapfilter.positioning.bayes.rivals.half_turns import HalfTurns
 from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
@@ -21,7 +22,8 @@ from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.positioning.sensors.watch import SensorWatch
 
-MAIN = belief(log_evidence=-10.0)
+MAIN, COMPASS = belief(log_evidence=-10.0), MotionErrors()
+WATCH = SensorWatch(pace=Pace(stepped_s=9.0), moving_s=4.0)
 
 
 def rival(odds, *, start_m=0.0, half_turn=True):
@@ -69,26 +71,54 @@ def test_a_search_tells_by_its_hypotheses_whose_the_half_turns_were(turned, walk
     assert HalfTurns(1.5).found(replace(MAIN, state=state)) == HalfTurns(1.5)
 
 
+@pytest.mark.parametrize(
+    ("turns", "odds"),
+    # The phone was turned at one of those in the search, and the walker turned at the others.
+    [(HalfTurns(0.0, 1), 4 / 3), (HalfTurns(0.0, 3), 4 / 9), (HalfTurns(2.0, 2), 4 / 12)],
+)
+def test_a_phone_that_was_turned_in_a_search_is_likely_to_be_turned_back(turns, odds):
+    assert turns.back_probability(HoldRules()) == pytest.approx(odds / (1 + odds))
+
+
+@pytest.mark.parametrize(("jump_rad", "share"), [(pi, 0.6), (2.0, 0.006)])
+def test_hypotheses_with_a_turned_phone_turn_it_back(jump_rad, share):
+    state = np.zeros((STATES, 20_000), dtype=np.float32)
+    state[BIAS, 10_000:] = pi
+    before = replace(MAIN, state=state, log_weight=np.full(20_000, -log(20_000.0)))
+    rules = replace(HoldRules(), around_probability=0.1)
+    rng = np.random.default_rng(3)
+    after = turned_at_jump(before, rules, jump_rad, rng, back_probability=0.6).state[BIAS]
+    changed = (after != state[BIAS]).reshape(2, -1).mean(axis=1)
+    # Four standard deviations of a binomial share.
+    for found, expected in zip(changed, (min(share, 0.1), share), strict=True):
+        sd = (expected * (1 - expected) / 10_000) ** 0.5
+        assert found == pytest.approx(expected, abs=4 * sd)
+
+
+@pytest.mark.parametrize(("bias_sd_deg", "tells"), [(10.0, True), (29.9, True), (30.1, False)])
+def test_a_wide_error_of_the_compass_does_not_tell_a_turned_phone(bias_sd_deg, tells):
+    assert MotionErrors(bias_sd_rad=radians(bias_sd_deg)).tells_turned is tells
+
+
 def walking(status=TRACKING, **more):
     """A state in the middle of a walk to the east."""
     state = np.zeros((STATES, 20), dtype=np.float32)
     own = replace(belief(status), state=state, log_weight=np.full(20, -log(20.0)),
                   kept=np.zeros((0, 20), np.float32))  # fmt: skip
-    watch = SensorWatch(pace=Pace(stepped_s=9.0), moving_s=4.0)
-    return BayesState(status=status, belief=own, watch=watch, walking_rad=0.0, **more)
+    return BayesState(status=status, belief=own, watch=WATCH, walking_rad=0.0, **more)
 
 
-def after_a_row(state, heading_rad):
+def after_a_row(state, heading_rad, motion=COMPASS):
     """The state after a row of motion with another heading."""
     filters = SimpleNamespace(
         holds=HoldRules(), pulls=PullRules(), map_may_start=False,
-        model=SimpleNamespace(motion=SimpleNamespace(white_rad=0.0, remounts_per_m=0.0)),
+        model=SimpleNamespace(motion=motion),
         moving_filter=lambda *_, **__: SimpleNamespace(predict=lambda given, *_: (given, None)),
         may_have_left=lambda _: False, followed_ways=lambda _: False,
         may_be_anywhere=lambda *_: False, positions_lead=lambda _: False,
     )  # fmt: skip
     epoch = Epoch(10.0, motion=(MotionStep(1.0, heading_rad),))
-    return moved(filters, state, SensorWatch(), epoch, np.random.default_rng(1))[0]
+    return moved(filters, state, WATCH, epoch, np.random.default_rng(1))[0]
 
 
 def test_who_has_turned_round_before_has_a_phone_that_is_less_likely_turned():
@@ -113,6 +143,15 @@ def test_a_search_counts_half_turns_until_it_has_found_a_place():
     state = after_a_row(replace(state, half_turns=HalfTurns(1.0)), pi)
     assert state.half_turns == HalfTurns(1.0, 1)
     assert after_a_row(replace(state, walking_rad=0.0), 2.0).half_turns == HalfTurns(1.0, 1)
+    # Of the next one a hypothesis in which the first was the phone's thinks otherwise.
+    turned = state.belief.state.copy()
+    turned[BIAS] = pi
+    twice = replace(state, walking_rad=0.0, belief=replace(state.belief, state=turned))
+    shares = [
+        (after_a_row(twice, pi, motion).belief.state[BIAS] != turned[BIAS]).mean()
+        for motion in (COMPASS, MotionErrors(bias_sd_rad=1.0))
+    ]
+    assert shares[0] > 0.25 > shares[1]
     assert state.begun_anew().half_turns == HalfTurns(1.0)
     tracked = walking(half_turns=HalfTurns(1.0, 2))
     assert after_a_row(tracked, 0.5).half_turns == HalfTurns(1.0, 2)

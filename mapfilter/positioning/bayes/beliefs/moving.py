@@ -239,10 +239,13 @@ class _Move:
             if self.positioned:
                 return belief
             changed_rad = self.state.hold.sign * (heading_rad - self.walking_rad)
-            rules, turns = self.beliefs.holds, self.half_turns
-            if rules.is_around(changed_rad):
+            usual, turns, back = self.beliefs.holds, self.half_turns, None
+            if usual.is_around(changed_rad):
                 self.half_turns = turns.in_search()
-            return turned_at_jump(belief, turns.rules(rules), changed_rad, self.own.forking)
+                if turns.searched and self.beliefs.model.motion.tells_turned:
+                    back = turns.back_probability(usual)
+            rules, own = turns.rules(usual), self.own.forking
+            return turned_at_jump(belief, rules, changed_rad, own, back_probability=back)
         tracked = self.state.status is Status.TRACKING and belief.status is Status.TRACKING
         if tracked and isinstance(belief, ParticleBelief):
             beliefs, null, hold = self.beliefs, self.state.null, self.state.hold

@@ -14,18 +14,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from math import exp, radians
+from math import exp
 
 import numpy as np
 
-from mapfilter.angles import wrap_rad
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.models.street_motion import BIAS
+from mapfilter.models.street_motion import is_turned
 from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
 
-_TURNED_RAD = radians(90.0)
-"""Lasting error of the headings from which on the phone of a hypothesis is turned."""
 _LARGEST = 700.0
 
 
@@ -61,6 +58,15 @@ class HalfTurns:
         odds = usual.around_probability / (1 - usual.around_probability) / (1 + known)
         return replace(usual, around_probability=odds / (1 + odds))
 
+    def back_probability(self, usual: HoldRules) -> float:
+        """Return the probability of the phone at the next half turn, if one in a search was its.
+
+        It is turned back then, which is likely.
+        """
+        others = replace(self, searched=max(self.searched - 1, 0)).rules(usual)
+        odds = usual.back_odds * others.around_probability / (1 - others.around_probability)
+        return odds / (1 + odds)
+
     def in_search(self) -> HalfTurns:
         """Return the numbers with a half turn while the belief searches."""
         return replace(self, searched=self.searched + 1)
@@ -78,8 +84,8 @@ class HalfTurns:
         """
         if not self.searched:
             return self
-        turned = np.abs(wrap_rad(belief.state[BIAS])) > _TURNED_RAD
-        return HalfTurns(self.walkers + self.searched - float(np.dot(belief.weight, turned)))
+        turned = float(np.dot(belief.weight, is_turned(belief.state)))
+        return HalfTurns(self.walkers + self.searched - turned)
 
     def with_jumps(self, some: Iterable[HeldOtherwise], main: ParticleBelief) -> HalfTurns:
         """Return the numbers with further half turns, each by the odds of its rival.

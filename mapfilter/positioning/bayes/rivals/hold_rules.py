@@ -71,6 +71,9 @@ class HoldRules(RivalRules):
     around_probability : float
         That a change right round is that of a phone being turned, of a walker who has not turned
         round before; ``probability`` is of others.
+    back_odds : float
+        Odds of its being turned back, where it is turned, against its being turned, where it is
+        not; for hypotheses of a search.
     mirrored_odds : float
         Odds of its being mirrored against its being turned.
     """
@@ -80,6 +83,7 @@ class HoldRules(RivalRules):
     longest_row_m: Positive = 3.0
     longest_pause_s: Positive = 3.0
     around_probability: Probability = 0.25
+    back_odds: Positive = 4.0
     mirrored_odds: Positive = 0.25
 
     def is_around(self, changed_rad: float) -> bool:
