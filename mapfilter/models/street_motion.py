@@ -23,7 +23,7 @@ from numba import njit
 
 from mapfilter._kernels import cos_sin32, exp32, hashed, normals, uniforms, wrap32
 from mapfilter._threads import ONE, Call
-from mapfilter._types import Floats32
+from mapfilter._types import Bools, Floats32
 from mapfilter.angles import wrap_rad
 from mapfilter.options import NotNegative, Options, Positive, Radians, Share
 
@@ -36,6 +36,8 @@ STATES = 8
 _F = np.float32
 _HEADING_SD_RAD, _BIAS_SD_RAD, _BIAS_DRIFT_RAD = radians(15.0), radians(10.0), radians(0.3)
 _DISTURBED_RAD, _RATE_RAD = radians(40.0), radians(0.15)
+_TURNED_RAD = radians(90.0)
+"""Lasting heading error from which on a phone is turned, and not its compass off."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +113,11 @@ class MotionErrors(Options):
     def white_rad(self) -> float:
         """Standard deviation of the white noise of a heading."""
         return self.heading_sd_rad * sqrt(self.white_share)
+
+    @property
+    def tells_turned(self) -> bool:
+        """Whether so large a lasting heading error is that of a turned phone."""
+        return 3 * self.bias_sd_rad < _TURNED_RAD
 
 
 def move(
@@ -261,6 +268,11 @@ def remounted(
     around_rad = wrap_rad(state[BIAS, chosen] + pi)
     turned[BIAS, chosen] = np.where(rng.random(count) < 0.5, around_rad, anywhere_rad)
     return turned
+
+
+def is_turned(state: Floats32) -> Bools:
+    """Return which hypotheses (STATES, N) have a turned phone, by their lasting heading error."""
+    return np.asarray(np.abs(wrap_rad(state[BIAS])) > _TURNED_RAD)
 
 
 def moved_back(state: Floats32, east_m: float, north_m: float) -> Floats32:

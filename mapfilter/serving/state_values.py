@@ -22,6 +22,7 @@ from mapfilter.models.level_memory import LevelMemory
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, NullHypothesis
+from mapfilter.positioning.bayes.rivals.half_turns import HalfTurns
 from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
 from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.rivals.mirrored import MirroredTwin
@@ -63,6 +64,7 @@ _CLASSES: dict[str, type] = {
         FoundErrors,
         GnssFix,
         GnssState,
+        HalfTurns,
         HeldOtherwise,
         Hold,
         LevelErrors,

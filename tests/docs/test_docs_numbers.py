@@ -37,7 +37,7 @@ MOTION, LEVELS = street_motion.MotionErrors(), level_errors.LevelErrors()
 SITES, SERVICE = models.KalmanOptions(), limits.ServiceLimits()
 KNOWN = assembly._particle_options(BAYES)
 BY_MAP, MAP_RULES = assembly._by_map_alone(KNOWN, RULES)
-WORDS = {8: "eight", 10: "ten"}
+WORDS = {4: "four", 8: "eight", 10: "ten"}
 
 
 FILTER = (
@@ -119,6 +119,7 @@ FAULTS = (
     f"of {HOLDS.particles} to {2 * HOLDS.particles} hypotheses",
     f"Where a jump is less than {number(HOLDS.around_deg)}°",
     f"odds that a jump is the phone's are {HOLDS.probability:g} to 1",
+    f"turn it back with {WORDS[HOLDS.back_odds]} times these odds",
     f"From {e_to(HOLDS.lost_log_odds)} on (a probability of 0.27), with a position more than 50 m "
     f"away, for {number(HOLDS.lost_after_m)} m or more",
     f"From {e_to(HOLDS.win_log_odds)} on the other belief takes over",

@@ -92,8 +92,10 @@ class Beliefs:
         self.asked.append(("without compass",))
         return given
 
-    def turned_at_jump(self, given, rules, changed_rad, rng):
+    def turned_at_jump(self, given, rules, changed_rad, rng, *, back_probability):
+        # At the first jump nothing is known of others.
         assert rules is self.holds
+        assert back_probability is None
         self.asked.append(("turned", changed_rad))
         return given
 

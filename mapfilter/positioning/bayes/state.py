@@ -20,6 +20,7 @@ from mapfilter.positioning.bayes.rivals.alternative import (
     MapBelief,
     NullHypothesis,
 )
+from mapfilter.positioning.bayes.rivals.half_turns import HalfTurns
 from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
 from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.rivals.mirrored import MirroredTwin
@@ -81,6 +82,8 @@ class BayesState:
         Heading of the last row of a walk, as measured.
     held : tuple of HeldOtherwise
         Beliefs in which the phone was turned, tested against the belief.
+    half_turns : HalfTurns
+        Half turns of the journey that were the walker's.
     alternatives : int
         Number of alternatives that were started.
     unaided : tuple of HeldOtherwise
@@ -114,6 +117,7 @@ class BayesState:
     hold: Hold = field(default_factory=Hold)
     walking_rad: float = nan
     held: tuple[HeldOtherwise, ...] = ()
+    half_turns: HalfTurns = field(default_factory=HalfTurns)
     alternatives: int = 0
     unaided: tuple[HeldOtherwise, ...] = ()
     proven: bool = False
@@ -139,6 +143,7 @@ class BayesState:
             recovery=None,
             twin=None,
             held=(),
+            half_turns=self.half_turns.anew(),
             unaided=(),
             proven=False,
         )

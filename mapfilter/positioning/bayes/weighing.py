@@ -249,6 +249,7 @@ class Weighing:
             hold=hold_after_takeover(state) if taken_over else state.hold,
             walking_rad=state.walking_rad,
             held=() if taken_over else state.held,
+            half_turns=state.half_turns.anew() if taken_over else state.half_turns,
             alternatives=state.alternatives,
             unaided=beside_alternative(state, before) if taken_over else state.unaided,
             proven=self._proven(state, now, before),

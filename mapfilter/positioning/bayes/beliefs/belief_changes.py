@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import radians, sqrt
+from math import sqrt
 
 import numpy as np
 
-from mapfilter.angles import wrap_one_rad, wrap_rad
+from mapfilter.angles import wrap_rad
 from mapfilter.filters.contract import Status
 from mapfilter.filters.grid import GridBelief
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.models.street_motion import BIAS, NORTH, MotionErrors
+from mapfilter.models.street_motion import BIAS, NORTH, MotionErrors, is_turned
 from mapfilter.models.street_motion import remounted as remounted_states
 from mapfilter.positioning.bayes.rivals.alternative import MapBelief
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
@@ -36,7 +36,12 @@ def carried_on(belief: MapBelief, rest: Rest, gone_s: float, rng: np.random.Gene
 
 
 def turned_at_jump(
-    belief: MapBelief, rules: HoldRules, changed_rad: float, rng: np.random.Generator
+    belief: MapBelief,
+    rules: HoldRules,
+    changed_rad: float,
+    rng: np.random.Generator,
+    *,
+    back_probability: float | None = None,
 ) -> MapBelief:
     """Turn the phone of some hypotheses of a search where its heading jumped.
 
@@ -50,11 +55,18 @@ def turned_at_jump(
     changed_rad : float
         Change of the direction that headings stand for, from the row before.
     rng : numpy.random.Generator
+    back_probability : float, optional
+        That a change right round is the phone's, of hypotheses in which it is turned; by default as
+        of the others.
     """
     if isinstance(belief, GridBelief):
         return belief
-    around = abs(wrap_one_rad(changed_rad)) > radians(rules.around_deg)
-    probability = rules.around_probability if around else rules.probability
+    around = rules.is_around(changed_rad)
+    probability = np.full(belief.log_weight.size, rules.probability)
+    if around:
+        probability[:] = rules.around_probability
+        if back_probability is not None:
+            probability[is_turned(belief.state)] = back_probability
     chosen = rng.random(belief.log_weight.size) < probability
     state = belief.state.copy()
     state[BIAS, chosen] = wrap_rad(state[BIAS, chosen] - changed_rad)

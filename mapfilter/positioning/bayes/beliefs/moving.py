@@ -20,6 +20,7 @@ from mapfilter.positioning.bayes.beliefs.belief_changes import (
 from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, MapBelief
+from mapfilter.positioning.bayes.rivals.half_turns import HalfTurns
 from mapfilter.positioning.bayes.rivals.held import (
     HeldOtherwise,
     as_measured,
@@ -92,6 +93,7 @@ class _Move:
     alternative: AlternativeHypothesis | None
     twin: MirroredTwin | None
     held: tuple[HeldOtherwise, ...]
+    half_turns: HalfTurns
     unaided: tuple[HeldOtherwise, ...]
     reckoning: DeadReckoning
     path: RecentPath
@@ -121,6 +123,7 @@ class _Move:
             alternative=state.alternative,
             twin=state.twin,
             held=state.held,
+            half_turns=state.half_turns,
             unaided=state.unaided,
             reckoning=state.reckoning,
             path=state.path,
@@ -236,14 +239,26 @@ class _Move:
             if self.positioned:
                 return belief
             changed_rad = self.state.hold.sign * (heading_rad - self.walking_rad)
-            return turned_at_jump(belief, self.beliefs.holds, changed_rad, self.own.forking)
+            usual, turns, back = self.beliefs.holds, self.half_turns, None
+            if usual.is_around(changed_rad):
+                self.half_turns = turns.in_search()
+                if turns.searched and self.beliefs.model.motion.tells_turned:
+                    back = turns.back_probability(usual)
+            rules, own = turns.rules(usual), self.own.forking
+            return turned_at_jump(belief, rules, changed_rad, own, back_probability=back)
         tracked = self.state.status is Status.TRACKING and belief.status is Status.TRACKING
         if tracked and isinstance(belief, ParticleBelief):
             beliefs, null, hold = self.beliefs, self.state.null, self.state.hold
             rules, white_rad, own = beliefs.holds, beliefs.model.motion.white_rad, self.own.forking
+            turns = self.half_turns.found(belief)
+            # What is still open tells something, too.
+            around = turns.with_jumps(self.held, belief).rules(rules).around_probability
             gone_m, jump_rad = self.reckoning.travelled_m, (self.walking_rad, heading_rad)
-            more = forked(rules, belief, null, hold, jump_rad, gone_m, white_rad, own)
-            self.held = still_open(rules, (*self.held, *more), belief, gone_m)
+            by = rules, belief, null, hold, jump_rad, gone_m, white_rad, own
+            more = forked(*by, around_probability=around)
+            beside = (*self.held, *more)
+            self.held = still_open(rules, beside, belief, gone_m)
+            self.half_turns = turns.after(beside, self.held, belief)
         return belief
 
     def after(self, watch: SensorWatch) -> BayesState:
@@ -260,6 +275,7 @@ class _Move:
             twin=self.twin,
             walking_rad=self.walking_rad,
             held=self.held,
+            half_turns=self.half_turns,
             unaided=self.unaided,
         )
 

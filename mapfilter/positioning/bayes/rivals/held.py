@@ -51,6 +51,9 @@ class HeldOtherwise:
         Distance travelled since which it is likely enough, and elsewhere; NaN if not.
     from_scratch : bool
         It began with one report alone, and not as the main belief.
+    tells_half_turn : bool
+        It began at a jump right round, as one of a turned phone: what becomes of it tells whether
+        the walker has turned round.
     """
 
     belief: ParticleBelief
@@ -60,6 +63,7 @@ class HeldOtherwise:
     null: NullHypothesis = field(default_factory=NullHypothesis)
     ahead_m: float = nan
     from_scratch: bool = False
+    tells_half_turn: bool = False
 
     def log_bayes_factor(self, main: ParticleBelief) -> float:
         """Return the logarithm of the Bayes factor against the main belief."""
@@ -101,6 +105,8 @@ def forked(
     travelled_m: float,
     white_rad: float,
     rng: np.random.Generator,
+    *,
+    around_probability: float | None = None,
 ) -> tuple[HeldOtherwise, ...]:
     """Return the beliefs in which the phone was turned, or mirrored, where its heading jumped.
 
@@ -119,9 +125,12 @@ def forked(
         White noise of a heading, which is in the jump twice.
     rng : numpy.random.Generator
         For the draws of these beliefs alone.
+    around_probability : float, optional
+        That a change right round is the phone's; by default that of the rules.
     """
     before_rad, after_rad = headings_rad
-    around = abs(float(wrap_rad(after_rad - before_rad))) > radians(rules.around_deg)
+    around = rules.is_around(after_rad - before_rad)
+    at_half_turn = rules.around_probability if around_probability is None else around_probability
     found = []
     ways: tuple[Hold, ...] = hold.straight_on(before_rad, after_rad)
     if not around:
@@ -129,12 +138,15 @@ def forked(
         ways = (*ways, hold.mirrored_at(before_rad))
     for one in ways:
         # Who has turned a phone is likely to turn it back.
-        likely = around or (one.is_usual and not hold.is_usual)
-        probability = rules.around_probability if likely else rules.probability
+        back = one.is_usual and not hold.is_usual
+        probability = rules.around_probability if back else rules.probability
+        probability = at_half_turn if around else probability
         log_prior = log(probability / (1 - probability))
         log_prior += log(rules.mirrored_odds) if one.sign != hold.sign else 0.0
         own = smaller(rules, belief, white_rad, rng)
-        found.append(HeldOtherwise(own, one, log_prior, travelled_m, null))
+        tells = around and one.sign == hold.sign
+        rival = HeldOtherwise(own, one, log_prior, travelled_m, null, tells_half_turn=tells)
+        found.append(rival)
     return tuple(found)
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import log
+from math import log, radians
 from typing import Annotated
 
 from annotated_types import Ge
 
+from mapfilter.angles import wrap_one_rad
 from mapfilter.options import NotNegative, Options, Positive, Probability
 
 
@@ -68,7 +69,11 @@ class HoldRules(RivalRules):
     longest_pause_s : float
         Who stood for longer may have turned there, so the change over it is no jump.
     around_probability : float
-        That a change right round is that of a phone being turned; ``probability`` is of others.
+        That a change right round is that of a phone being turned, of a walker who has not turned
+        round before; ``probability`` is of others.
+    back_odds : float
+        Odds of its being turned back, where it is turned, against its being turned, where it is
+        not; for hypotheses of a search.
     mirrored_odds : float
         Odds of its being mirrored against its being turned.
     """
@@ -78,7 +83,12 @@ class HoldRules(RivalRules):
     longest_row_m: Positive = 3.0
     longest_pause_s: Positive = 3.0
     around_probability: Probability = 0.25
+    back_odds: Positive = 4.0
     mirrored_odds: Positive = 0.25
+
+    def is_around(self, changed_rad: float) -> bool:
+        """Return whether a change of the heading is one right round."""
+        return abs(wrap_one_rad(changed_rad)) > radians(self.around_deg)
 
 
 @dataclass(frozen=True, slots=True)

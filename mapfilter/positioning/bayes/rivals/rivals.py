@@ -72,6 +72,7 @@ class Rivals:
         )
         found = [one for one in weighed if one is not None]
         held = still_open(holds, found, main, state.reckoning.travelled_m)
+        state = replace(state, half_turns=state.half_turns.after(found, held, main))
         best = winner(holds, held, main, rules.converge_log_odds)
         if best is None:
             return replace(state, held=held)
