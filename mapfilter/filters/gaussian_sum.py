@@ -198,7 +198,8 @@ def _run_mixture(
     return means, covariances, evidence, counts
 
 
-_run_mixture_kernel = on_demand(_FOUND(*RUN, MATRIX, MATRIX, BLOCK, VECTOR, float64), _run_mixture)
+run_mixture_kernel = on_demand(_FOUND(*RUN, MATRIX, MATRIX, BLOCK, VECTOR, float64), _run_mixture)
+"""Return :func:`_run_mixture`, compiled."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,7 +261,7 @@ def run_mixtures(
     means, covariances = np.empty((trials, steps, n)), np.empty((trials, steps, n, n))
     evidence, counts = np.empty((trials, steps)), np.empty((trials, steps), dtype=np.int64)
     for trial in range(trials):
-        means[trial], covariances[trial], evidence[trial], counts[trial] = _run_mixture_kernel()(
+        means[trial], covariances[trial], evidence[trial], counts[trial] = run_mixture_kernel()(
             kernel_of(method),
             measurement.measure,
             problem,

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -27,7 +28,7 @@ from mapfilter.filters.resampling import copy_with_jitter, normalise, systematic
 from mapfilter.lattice import Lattice
 from mapfilter.models.fingerprint import BoundReading, weigh_by_bound
 from mapfilter.models.level_errors import LevelReport
-from mapfilter.models.street_motion import STATES
+from mapfilter.models.street_motion import OFF, STATES
 from mapfilter.models.way_map import all_inside, weight_inside
 from mapfilter.positioning.bayes.area.area_map import AreaMap
 from mapfilter.positioning.bayes.beliefs.model import BayesModel
@@ -136,18 +137,43 @@ def compile_gaussian() -> None:
     protected_m(GaussianTail(np.ones(1), np.zeros((1, 2)), np.eye(2)[None]), radii_m)
 
 
+def compile_mixtures() -> None:
+    """Compile Gaussian sums, and the backward simulation of smoothing."""
+    from mapfilter.filters.gaussian_sum import run_mixture_kernel
+    from mapfilter.models.street_ancestors import draw_ancestors
+
+    run_mixture_kernel()
+    _, cloud, log_weight = _made()
+    state, weight = cloud.state[: OFF + 1].copy(), log_weight.astype(np.float32)
+    key = draw_key(np.random.default_rng(0))
+    draw_ancestors(state, state, weight, (1.0, 0.0), (1.0, 1.0, 1.0), -10.0, key)
+
+
+def compile_bounds() -> None:
+    """Compile what ``bound`` computes of a map, by one of a few streets."""
+    from mapfilter.database.store import open_database
+    from mapfilter.evaluation.first_fix import FirstFixOptions
+    from mapfilter.evaluation.map_bound import bound
+    from mapfilter.workflows.bench import build_made, made_rasters
+
+    with tempfile.TemporaryDirectory(prefix="mapfilter-kernels-") as name:
+        rasters, _ = made_rasters(Path(name) / "rasters.tif", 2, 10 * _PIXELS)
+        build_made(rasters.path, 20 * _PIXELS)
+        bound(open_database(Path(name) / "peak"), options=FirstFixOptions(journeys=1))
+
+
 def compile_all() -> None:
-    """Compile what the usual filters need, so that no first run has to: for an image, say.
+    """Compile what the usual commands need, so that no first run has to: for an image, say.
 
-    These are the Bayes map filter on a map that is held whole, Kalman-type filters and weighing by
-    Rao-Blackwellised particles. What large areas, smoothing and Gaussian sums need besides is
-    compiled when it is first called.
+    These are the Bayes map filter on a map that is held whole and its smoothing, Kalman-type
+    filters, Gaussian sums, weighing by Rao-Blackwellised particles, and ``bound``. What large areas
+    need besides is compiled when it is first called.
 
-    ``python -m mapfilter.workflows.kernels`` does this; it takes about a minute, and two seconds
-    where all is compiled already. With ``--replay`` it compiles those of the Bayes map filter
-    alone, in two processes.
+    ``python -m mapfilter.workflows.kernels`` does this; it takes more than a minute, and some
+    seconds where all is compiled already. With ``--replay`` it compiles those of the Bayes map
+    filter alone, in two processes.
     """
-    for task in (*_TASKS, compile_gaussian):
+    for task in (*_TASKS, compile_gaussian, compile_mixtures, compile_bounds):
         task()
 
 

@@ -11,7 +11,15 @@ import geopandas as gpd
 import numpy as np
 import pandas as pd
 import pytest
-from cross_world import LATTICE, levels_dbm, make_database, make_plan, make_routes, walk_log
+from cross_world import (
+    LATTICE,
+    WALK,
+    levels_dbm,
+    make_database,
+    make_plan,
+    make_routes,
+    walk_log,
+)
 from matplotlib.figure import Figure
 
 import mapfilter as mf
@@ -84,7 +92,7 @@ def test_a_picture_is_saved_as_the_commands_save_theirs(track, tmp_path):
 
 @pytest.mark.parametrize("filter_", ["ekf", mf.KalmanFilter(), mf.KalmanFilter], ids=str)
 def test_a_filter_without_a_map_needs_no_database(filter_, tmp_path):
-    walk = walk_log()
+    walk = walk_log(WALK[:2])
     fixes = walk.truth[["time_s", "east_m", "north_m"]]
     log = mf.make_log(walk.crs, motion=walk.motion, gnss=fixes, truth=walk.truth)
     found = mf.locate(log, None, filter_)
@@ -109,7 +117,7 @@ def test_a_filter_without_a_map_may_have_sites_of_its_own(database):
 
 
 def test_cells_without_sites_are_left_out_where_there_are_fixes():
-    walk = walk_log()
+    walk = walk_log(WALK[:2])
     fixes = walk.truth[["time_s", "east_m", "north_m"]]
     placed = mf.make_log(walk.crs, motion=walk.motion, radio=walk.radio, gnss=fixes)
     found = mf.locate(placed, filter="ekf")
@@ -127,7 +135,7 @@ def test_a_filter_is_given_by_options_or_name(filter_, database, track):
 
 
 def test_a_track_says_what_a_log_lacks_that_was_not_located(database):
-    walk = walk_log()
+    walk = walk_log(WALK[:2])
     fixes = walk.truth[["time_s", "east_m", "north_m"]]
     still = mf.make_log(walk.crs, radio=walk.radio, truth=walk.truth)
     (note,) = mf.locate(still, database).log.notes

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from functools import partial
 
 from mapfilter.filters._rao_blackwell import weigh_kernel
 from mapfilter.filters._updates import _compiled, kernel_of, run_lanes_kernel
@@ -82,9 +83,10 @@ def test_all_kernels_are_compiled_by_one_call(monkeypatch):
     for name in ("compile_motion", "compile_evidence", "compile_summaries", "compile_resampling"):
         assert getattr(kernels, name) in kernels._TASKS
     monkeypatch.setattr(kernels, "_TASKS", (lambda: done.append("replay"),))
-    monkeypatch.setattr(kernels, "compile_gaussian", lambda: done.append("gaussian"))
+    for name in ("gaussian", "mixtures", "bounds"):
+        monkeypatch.setattr(kernels, f"compile_{name}", partial(done.append, name))
     kernels.compile_all()
-    assert done == ["replay", "gaussian"]
+    assert done == ["replay", "gaussian", "mixtures", "bounds"]
 
 
 def test_a_kernel_is_kept_by_its_line():
