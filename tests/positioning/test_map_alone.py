@@ -1,6 +1,7 @@
 """Positioning by a map and dead reckoning alone, in a town of irregular blocks."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -57,12 +58,27 @@ def located(filter_, log, seed=1):
     return estimate, error_m, np.isin(estimate.status, FOUND)
 
 
+def drive_log(seed, compass_sd_deg):
+    """Return the log of a drive of 2.5 km."""
+    path = drive(TOWN, seed, 2500.0)
+    return as_log(path, odometry(path, seed, compass_sd_deg=compass_sd_deg))
+
+
+@pytest.fixture(scope="module")
+def located_drive(vehicle):
+    """Locate such a drive by the town's own map, each once."""
+
+    @cache
+    def of(seed, compass_sd_deg):
+        return located(vehicle, drive_log(seed, compass_sd_deg))
+
+    return of
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("compass_sd_deg", [None, 5.0])
-def test_a_drive_from_an_unknown_start_is_found_and_followed(vehicle, seed, compass_sd_deg):
-    path = drive(TOWN, seed, 2500.0)
-    log = as_log(path, odometry(path, seed, compass_sd_deg=compass_sd_deg))
-    _, error_m, found = located(vehicle, log)
+def test_a_drive_from_an_unknown_start_is_found_and_followed(located_drive, seed, compass_sd_deg):
+    _, error_m, found = located_drive(seed, compass_sd_deg)
     assert found[-1]
     assert found.mean() > 0.25
     assert np.median(error_m[found]) < 5
@@ -99,7 +115,7 @@ def drawn_ways(lattice):
 
 
 @pytest.mark.long
-def test_a_road_raster_gives_the_result_of_its_ways(town, vehicle, tmp_path):
+def test_a_road_raster_gives_the_result_of_its_ways(town, located_drive, tmp_path):
     side_m = 1.0
     fine = replace(LATTICE, resolution_m=side_m, rows=5 * LATTICE.rows, cols=5 * LATTICE.cols)
     drawn = drawn_ways(fine)
@@ -116,10 +132,9 @@ def test_a_road_raster_gives_the_result_of_its_ways(town, vehicle, tmp_path):
     assert apart_m[one.on_way & other.on_way].max() <= side_m
     # Points come and go at the edge of the ways, by a pixel of the lattice.
     assert apart_m.max() <= LATTICE.resolution_m + side_m
-    path = drive(TOWN, 2, 2500.0)
-    log = as_log(path, odometry(path, 2))
-    _, by_lines_m, found = located(vehicle, log)
-    _, by_raster_m, also = located(BayesFilter(vehicle=True, **FEW).over(painted), log)
+    _, by_lines_m, found = located_drive(2, None)
+    by_raster = BayesFilter(vehicle=True, **FEW).over(painted)
+    _, by_raster_m, also = located(by_raster, drive_log(2, None))
     assert also[-1]
     both = found & also
     assert both.mean() > 0.2
