@@ -120,15 +120,15 @@ def factors_of(covariances: Floats, size: int) -> Floats:
     if covariances.shape[1:] != (size, size):
         return np.array([factor_of(one, size) for one in covariances])
     variances = np.diagonal(covariances, axis1=1, axis2=2)
-    unit = np.sqrt(np.where(variances > 0, variances, 1.0))
-    off = np.abs(covariances - covariances.transpose(0, 2, 1))
-    sound = np.isfinite(covariances).all() and (variances > 0).all()
-    if sound and (off <= 1e-9 * np.abs(covariances)).all():
-        try:
-            correlations = covariances / (unit[:, :, None] * unit[:, None, :])
-            return np.asarray(unit[:, :, None] * np.linalg.cholesky(correlations))
-        except np.linalg.LinAlgError:
-            pass
+    if np.isfinite(covariances).all() and (variances > 0).all():
+        unit = np.sqrt(variances)
+        off = np.abs(covariances - covariances.transpose(0, 2, 1))
+        if (off <= 1e-9 * np.abs(covariances)).all():
+            try:
+                correlations = covariances / (unit[:, :, None] * unit[:, None, :])
+                return np.asarray(unit[:, :, None] * np.linalg.cholesky(correlations))
+            except np.linalg.LinAlgError:
+                pass
     return np.array([factor_of(one, size) for one in covariances])
 
 

@@ -21,6 +21,7 @@ from mapfilter.filters.gaussian import (
     Method,
     SigmaPoints,
     factor_of,
+    factors_of,
 )
 from mapfilter.filters.gaussian_sum import split
 from mapfilter.filters.kalman import smooth
@@ -86,6 +87,52 @@ def test_where_sigma_points_lie():
         assert problem.diagonal
     correlated = position_fix(POSITION, [[1.0, 1e-9], [1e-9, 1.0]])
     assert not problem_of(compiled(correlated), np.eye(2), np.zeros((2, 2)), IEKF).diagonal
+
+
+def covariances(count, size, seed=0):
+    """Covariances of which each component has a unit of its own, from 1e-6 to 1e6."""
+    rng = np.random.default_rng(seed)
+    root = rng.standard_normal((count, size, size)) + 2 * np.eye(size)
+    root *= 10.0 ** rng.integers(-6, 7, (count, size, 1))
+    return root @ root.transpose(0, 2, 1)
+
+
+@pytest.mark.parametrize("size", [1, 2, 5])
+def test_factors_of_a_stack_are_those_of_each(size):
+    stack = covariances(6, size)
+    singular = np.ones((size, size))
+    unknown = np.diag(np.append(np.zeros(1), np.ones(size - 1)))
+    for more in ((), (singular,), (unknown, singular)):
+        every = np.array([*stack, *more])
+        found = factors_of(every, size)
+        for factor, one in zip(found, every, strict=True):
+            np.testing.assert_allclose(factor, factor_of(one, size), rtol=1e-9)
+            np.testing.assert_array_equal(factor, np.tril(factor))
+            unit = np.sqrt(np.maximum(np.diagonal(one), 1e-300))
+            error = (factor @ factor.T - one) / np.outer(unit, unit)
+            assert np.abs(error).max() < 1e-12
+    assert factors_of(np.empty((0, size, size)), size).size == 0
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ([[1.0, 0.5], [0.4, 1.0]], "a symmetric matrix"),
+        ([[1.0, 0.0], [0.0, -1.0]], "variances >= 0"),
+        ([[1.0, 2.0], [2.0, 1.0]], "no negative eigenvalue"),
+        ([[1.0, np.nan], [np.nan, 1.0]], "finite numbers"),
+        ([[np.inf, 0.0], [0.0, 1.0]], "finite numbers"),
+        ([[1.0, 0.5 + 1e-8], [0.5, 1.0]], "a symmetric matrix"),
+    ],
+)
+def test_one_of_a_stack_that_is_no_covariance_is_refused(wrong, told):
+    stack = covariances(3, 2)
+    stack[1] = wrong
+    with pytest.raises(InputError) as caught:
+        factors_of(stack, 2)
+    assert [fault.expected for fault in caught.value.faults] == [told]
+    with pytest.raises(InputError, match="expected shape"):
+        factors_of(stack, 3)
 
 
 def test_factors_of_covariances():
