@@ -10,6 +10,7 @@ from typing import Any
 
 from sphinx.application import Sphinx
 from sphinx.domains.python import PythonDomain
+from sphinx.pycode.parser import Parser
 
 # Pages are kept until the end: the search among them for unused cycles takes a tenth of a build.
 gc.set_threshold(200_000, 50, 100)
@@ -94,7 +95,15 @@ class _Names(PythonDomain):
         return list(self._found[sought])
 
 
+def _find_no_definitions(_parser: Parser) -> None:
+    """Leave out the lines of definitions, which pages with sources alone would need.
+
+    Looking for them takes most of the reading of sources.
+    """
+
+
 def setup(app: Sphinx) -> None:
     """Connect what is done to pages before the theme (at 500) is."""
     app.add_domain(_Names, override=True)
+    Parser.parse_definition = _find_no_definitions
     app.connect("html-page-context", _sidebar_of_modules, priority=400)
