@@ -18,6 +18,7 @@ from mapfilter.positioning.bayes.beliefs.belief_changes import (
     turned_at_jump,
 )
 from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.beliefs.legs import NO_LEG, Leg, may_wait
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, MapBelief
 from mapfilter.positioning.bayes.rivals.held import (
@@ -43,8 +44,9 @@ def moved(
     watch: SensorWatch,
     epoch: Epoch,
     rng: np.random.Generator,
+    waits: Callable[[float], bool] | None = None,
 ) -> tuple[BayesState, list[UnusedReading]]:
-    """Move the beliefs by an epoch's dead reckoning.
+    """Move the beliefs by an epoch's dead reckoning, unless its steps wait for others.
 
     Parameters
     ----------
@@ -57,6 +59,9 @@ def moved(
     epoch : Epoch
         With a step to all sides for motion that was not measured.
     rng : numpy.random.Generator
+    waits : callable
+        Returns whether beliefs may wait, by the distance travelled after the motion. Without it
+        each row moves them by itself.
 
     Returns
     -------
@@ -67,12 +72,14 @@ def moved(
     rested = state.watch.rest if watch.rest is None else None
     if beliefs.may_be_anywhere(state, watch, epoch.time_s):
         state = state.begun_anew()
-    move = _Move.of(beliefs, state, epoch, rng)
+    move = _Move.of(beliefs, state, epoch, rng, gathers=waits is not None)
     move.begin_rivals()
     if rested is not None:
         move.carry_on(rested)
     for row in epoch.motion:
         move.by_row(row)
+    if waits is None or move.leg.is_whole or not waits(move.reckoning.travelled_m):
+        move.finish_leg()
     return move.after(watch), move.unused
 
 
@@ -85,6 +92,7 @@ class _Move:
     epoch: Epoch
     rng: np.random.Generator
     own: OwnDraws
+    gathers: bool
     ranged: bool
     positioned: bool
     by_course: bool
@@ -93,6 +101,7 @@ class _Move:
     twin: MirroredTwin | None
     held: tuple[HeldOtherwise, ...]
     unaided: tuple[HeldOtherwise, ...]
+    leg: Leg
     reckoning: DeadReckoning
     path: RecentPath
     heading_rad: float
@@ -102,9 +111,15 @@ class _Move:
 
     @classmethod
     def of(
-        cls, beliefs: BeliefFilters, state: BayesState, epoch: Epoch, rng: np.random.Generator
+        cls,
+        beliefs: BeliefFilters,
+        state: BayesState,
+        epoch: Epoch,
+        rng: np.random.Generator,
+        *,
+        gathers: bool,
     ) -> _Move:
-        """Return the motion of an epoch before its first row."""
+        """Return the motion of an epoch before its first row; ``gathers`` is whether rows wait."""
         ranged = any(isfinite(one.pseudorange_m) for one in epoch.pseudoranges)
         stood_s = epoch.time_s - state.watch.pace.stepped_s
         return cls(
@@ -113,6 +128,7 @@ class _Move:
             epoch=epoch,
             rng=rng,
             own=OwnDraws(epoch.time_s),
+            gathers=gathers,
             ranged=ranged,
             positioned=epoch.gnss is not None or ranged,
             # Courses along ways count from a heading of 0, those of a compass from its headings.
@@ -122,6 +138,7 @@ class _Move:
             twin=state.twin,
             held=state.held,
             unaided=state.unaided,
+            leg=state.leg,
             reckoning=state.reckoning,
             path=state.path,
             heading_rad=state.heading_rad,
@@ -140,7 +157,8 @@ class _Move:
             self.held = () if hold.is_as_measured else tuple(as_is)
         if not self.positioned or not isinstance(belief, ParticleBelief):
             return
-        beliefs, null = self.beliefs, self.state.null
+        self.finish_leg()
+        beliefs, null, belief = self.beliefs, self.state.null, self.belief
         # Positions tell whether headings are still read rightly.
         plain = hold.is_as_measured or any(one.hold.is_as_measured for one in self.held)
         if not plain and self.state.status is belief.status is Status.TRACKING:
@@ -155,6 +173,7 @@ class _Move:
     def carry_on(self, rested: Rest) -> None:
         """Spread the belief over where one may have been carried during a rest that has ended."""
         if self.belief is not None and self.beliefs.may_have_left(self.state):
+            self.finish_leg()
             gone_s = self.epoch.time_s - rested.since_s
             self.belief = carried_on(self.belief, rested, gone_s, self.own.carrying)
 
@@ -202,9 +221,37 @@ class _Move:
             self.compass, belief = False, self.beliefs.without_compass(belief, self.rng)
             # What began beside it has headings of a compass.
             self.unaided = ()
-        predict = self.beliefs.moving_filter(self.state, compass=self.compass).predict
+            self.belief = belief
         if self.compass and not self.ranged and jumps(self.walking_rad, row, self.beliefs.holds):
-            belief = self._at_a_jump(belief, row.heading_rad)
+            self.finish_leg()
+            self.belief = self._at_a_jump(self.belief, row.heading_rad)
+        before, self.reckoning = self.reckoning, self.reckoning.moved(step)
+        if self.gathers and isinstance(belief, ParticleBelief) and may_wait(measured):
+            self._join(measured, before)
+            return Reason.USED
+        self.finish_leg()
+        return self._take(measured)
+
+    def _join(self, measured: MotionStep, before: DeadReckoning) -> None:
+        """Let a step wait, with those that lead to the same side."""
+        joined = self.leg.joined(measured, before)
+        if joined is None:
+            self.finish_leg()
+            joined = self.leg.joined(measured, before)
+        assert joined is not None, "a leg begins with any step"
+        self.leg = joined
+
+    def finish_leg(self) -> None:
+        """Move the beliefs by what waits."""
+        leg, self.leg = self.leg, NO_LEG
+        if leg.rows:
+            self._take(leg.step)
+
+    def _take(self, measured: MotionStep) -> Reason:
+        """Move all beliefs by a step, each as it reads it."""
+        belief, step = self.belief, self.state.hold.read(measured)
+        assert belief is not None, "steps wait for a belief"
+        predict = self.beliefs.moving_filter(self.state, compass=self.compass).predict
         if self.held:
             own = self.own.moving
             self.held = tuple(_moved_as_read(one, predict, measured, own) for one in self.held)
@@ -215,7 +262,6 @@ class _Move:
         belief, why = predict(belief, _assumed(step, belief), self.rng)
         motion = self.beliefs.model.motion
         self.belief = remounted(belief, motion, abs(step.step_m), self.rng)
-        self.reckoning = self.reckoning.moved(step)
         if self.alternative is not None:
             other = self.alternative.belief
             as_read = self.alternative.hold.read(measured)
@@ -261,6 +307,7 @@ class _Move:
             walking_rad=self.walking_rad,
             held=self.held,
             unaided=self.unaided,
+            leg=self.leg,
         )
 
 
