@@ -38,7 +38,7 @@ from mapfilter.positioning.bayes.sources.radio import RadioSource
 from mapfilter.positioning.bayes.sources.timing import TimingSource
 from mapfilter.positioning.bayes.sources.usable import UsableEpoch, usable_epoch
 from mapfilter.positioning.bayes.state import BayesState, belief_here, check_state, step_output
-from mapfilter.positioning.bayes.waiting import may_wait
+from mapfilter.positioning.bayes.waiting import waits
 from mapfilter.positioning.bayes.warm_up import run_kernels
 from mapfilter.positioning.bayes.weighing import Weighing
 from mapfilter.positioning.epoch_checks import (
@@ -205,8 +205,8 @@ class BayesPositioner(Filter[BayesState]):
         before, weighing = state.status, self._weighing
         usable = usable_epoch(state, epoch, by_ways=self.beliefs.by_ways)
         epoch, motion, radio = usable.epoch, usable.motion, usable.radio
-        waits = self._waits(given, usable)
-        state, unused = moved(self.beliefs, state, usable.watch, epoch, rng, waits)
+        wait = self._waits(given, usable)
+        state, unused = moved(self.beliefs, state, usable.watch, epoch, rng, wait)
         travelled_m = state.reckoning.travelled_m
         if motion is not Reason.USED:
             unused = [UnusedReading(epoch.time_s, "motion", "", motion)]
@@ -223,7 +223,7 @@ class BayesPositioner(Filter[BayesState]):
             if started is not None:
                 belief, sources = started
                 state = replace(state, belief=belief, sources={**state.sources, **sources})
-        elif state.belief is not given.belief or not waits or not waits(travelled_m):
+        elif state.belief is not given.belief or not wait or not wait(travelled_m):
             # Else nothing is read of it.
             moved_only = state.belief
             measured = usable.is_measured
@@ -263,21 +263,13 @@ class BayesPositioner(Filter[BayesState]):
         """
         spacing_m, given, state = state.particle_spacing_m, state, _tracked(state)
         usable = usable_epoch(state, epoch, by_ways=self.beliefs.by_ways)
-        waits = self._waits(given, usable)
-        state, _ = moved(self.beliefs, state, usable.watch, usable.epoch, rng, waits)
+        wait = self._waits(given, usable)
+        state, _ = moved(self.beliefs, state, usable.watch, usable.epoch, rng, wait)
         return *self._weighing.collected(state, usable.epoch, spacing_m), usable.is_measured
 
     def _waits(self, state: BayesState, usable: UsableEpoch) -> Callable[[float], bool] | None:
-        """Return whether beliefs may wait, by the distance travelled after an epoch's motion.
-
-        None where they may not, however far that is.
-        """
-        more = self.more_sources or self.beliefs.map_may_start
-        if more or not may_wait(self.beliefs, state, usable):
-            return None
-        due, used = self._radio.due, state.sources[self._radio.name]
-        has_report = bool(usable.epoch.radio)
-        return lambda travelled_m: not (has_report and due(used, travelled_m))
+        # Other sources may read beliefs at any epoch.
+        return None if self.more_sources else waits(self.beliefs, self._radio, state, usable)
 
     def for_scores(self) -> BayesPositioner:
         """Return the filter without ways, radii of 99 % and protection levels in its outputs."""

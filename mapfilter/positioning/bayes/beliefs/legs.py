@@ -14,7 +14,8 @@ from typing import NamedTuple
 from mapfilter._types import Floats, Floats32
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.hypotheses import NEAR_M
-from mapfilter.models.street_motion import EAST, NORTH, mean_lead, moved_back
+from mapfilter.models.street_lead import mean_lead
+from mapfilter.models.street_motion import EAST, NORTH, moved_back
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning
 
 LEG_M = 8.0

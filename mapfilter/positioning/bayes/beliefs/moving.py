@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import isfinite, nan
-from typing import Any
 
 import numpy as np
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.beliefs.belief_changes import (
+    assumed,
     carried_on,
     counted_from,
+    moved_as_read,
     remounted,
     turned_at_jump,
 )
@@ -150,15 +151,16 @@ class _Move:
 
     def begin_rivals(self) -> None:
         """Begin beliefs beside the main one that this epoch's positions call for."""
-        belief, hold, gone_m = self.belief, self.state.hold, self.reckoning.travelled_m
+        hold, gone_m = self.state.hold, self.reckoning.travelled_m
         if self.ranged:
             # Pseudoranges are compared with the main belief alone, so there is no doubt of a jump.
             as_is = (one for one in self.held if one.hold.is_as_measured)
             self.held = () if hold.is_as_measured else tuple(as_is)
+        if self.positioned:
+            self.finish_leg()
+        beliefs, null, belief = self.beliefs, self.state.null, self.belief
         if not self.positioned or not isinstance(belief, ParticleBelief):
             return
-        self.finish_leg()
-        beliefs, null, belief = self.beliefs, self.state.null, self.belief
         # Positions tell whether headings are still read rightly.
         plain = hold.is_as_measured or any(one.hold.is_as_measured for one in self.held)
         if not plain and self.state.status is belief.status is Status.TRACKING:
@@ -224,6 +226,7 @@ class _Move:
             self.belief = belief
         if self.compass and not self.ranged and jumps(self.walking_rad, row, self.beliefs.holds):
             self.finish_leg()
+            assert self.belief is not None, "steps wait for a belief"
             self.belief = self._at_a_jump(self.belief, row.heading_rad)
         before, self.reckoning = self.reckoning, self.reckoning.moved(step)
         if self.gathers and isinstance(belief, ParticleBelief) and may_wait(measured):
@@ -254,22 +257,22 @@ class _Move:
         predict = self.beliefs.moving_filter(self.state, compass=self.compass).predict
         if self.held:
             own = self.own.moving
-            self.held = tuple(_moved_as_read(one, predict, measured, own) for one in self.held)
+            self.held = tuple(moved_as_read(one, predict, measured, own) for one in self.held)
         if self.unaided:
             own = self.own.unaided
-            beside = (_moved_as_read(one, predict, measured, own) for one in self.unaided)
+            beside = (moved_as_read(one, predict, measured, own) for one in self.unaided)
             self.unaided = tuple(beside)
-        belief, why = predict(belief, _assumed(step, belief), self.rng)
+        belief, why = predict(belief, assumed(step, belief), self.rng)
         motion = self.beliefs.model.motion
         self.belief = remounted(belief, motion, abs(step.step_m), self.rng)
         if self.alternative is not None:
             other = self.alternative.belief
             as_read = self.alternative.hold.read(measured)
-            other, _ = predict(other, _assumed(as_read, other), self.rng)
+            other, _ = predict(other, assumed(as_read, other), self.rng)
             self.alternative = replace(self.alternative, belief=other)
         if self.twin is not None:
             other = self.twin.belief
-            other, _ = predict(other, _assumed(mirrored_step(step), other), self.rng)
+            other, _ = predict(other, assumed(mirrored_step(step), other), self.rng)
             self.twin = replace(self.twin, belief=other)
         return why
 
@@ -309,21 +312,3 @@ class _Move:
             unaided=self.unaided,
             leg=self.leg,
         )
-
-
-def _moved_as_read(
-    one: HeldOtherwise, predict: Callable[..., Any], measured: MotionStep, rng: np.random.Generator
-) -> HeldOtherwise:
-    """Return a belief beside the main one, moved by a step as it reads it."""
-    as_read = one.hold.read(measured)
-    return replace(one, belief=predict(one.belief, _assumed(as_read, one.belief), rng)[0])
-
-
-def _assumed(step: MotionStep, belief: MapBelief) -> MotionStep:
-    """Return a step with the errors that a belief assumes: that of its sampling once it is tracked.
-
-    With it a belief that still searches would be too wide to be in one place for some way.
-    """
-    if step.sampling_sd_m == 0 or belief.status is Status.TRACKING:
-        return step
-    return replace(step, sampling_sd_m=0.0)
