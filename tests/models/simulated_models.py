@@ -93,8 +93,8 @@ def test_pixels():
 
 
 def test_ageing():
-    _, (given,), (expected,) = done(ageing)
-    kept, usual = given.before, given.fault_log_odds
+    p, (given,), (expected,) = done(ageing)
+    kept, usual = p.kept, given.fault_log_odds
     cuda_reports.age(kept, given.decay, given.fault_keep, usual)
     np.testing.assert_allclose(kept, expected, rtol=1e-6, atol=1e-6)
 
