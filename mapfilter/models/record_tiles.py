@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
+from numba.core import cgutils as _cgutils
 from numba.extending import intrinsic, overload
 
 from mapfilter._types import Floats32, Ints32
@@ -33,6 +33,7 @@ _LINE_BYTES = 64
 _INDEX = ir.IntType(32)
 _VECTOR = ir.VectorType(ir.FloatType(), TILE)
 _LANES = ir.VectorType(_INDEX, TILE)
+_build: Any = _cgutils
 _ROUNDED = ("contract",)
 """A product and a sum may be rounded once, as in the loops of kernels."""
 
@@ -124,6 +125,11 @@ def fetch(records: Floats32, at: int) -> None:
     """Begin to read a record, so that it is in the cache when it is needed."""
 
 
+def _instruction(function: Callable[..., Any]) -> Callable[..., Any]:
+    made: Callable[..., Any] = intrinsic(function)
+    return made
+
+
 def _shuffled(builder: Any, one: Any, other: Any, lanes: list[int]) -> Any:
     return builder.shuffle_vector(one, other, ir.Constant(_LANES, lanes))
 
@@ -156,7 +162,7 @@ class _Arguments:
         """Return the address of an array's element."""
         kind = self._types[k]
         array = self._context.make_array(kind)(self._context, self._builder, self._values[k])
-        return cgutils.get_item_pointer(
+        return _build.get_item_pointer(
             self._context, self._builder, kind, array, at, wraparound=False
         )
 
@@ -182,7 +188,7 @@ class _Arguments:
         return self._builder.add(index, ir.Constant(index.type, more))
 
 
-@intrinsic
+@_instruction
 def _gather(
     typing: Any, records: Any, at: Any, first: Any, row: Any, factor: Any, usual: Any, block: Any
 ) -> Any:
@@ -219,17 +225,17 @@ def _written_back(align: int, hint: bool) -> Callable[..., Any]:
     return made
 
 
-@intrinsic
+@_instruction
 def _scatter(typing: Any, block: Any, first: Any, row: Any, records: Any, to: Any) -> Any:
     return types.void(block, first, row, records, to), _written_back(4, False)
 
 
-@intrinsic
+@_instruction
 def _stream(typing: Any, block: Any, first: Any, row: Any, records: Any, to: Any) -> Any:
     return types.void(block, first, row, records, to), _written_back(_LINE_BYTES, True)
 
 
-@intrinsic
+@_instruction
 def _streamed(typing: Any) -> Any:
     def made(context: Any, builder: Any, *_: Any) -> Any:
         builder.fence("seq_cst")
@@ -238,14 +244,14 @@ def _streamed(typing: Any) -> Any:
     return types.void(), made
 
 
-@intrinsic
+@_instruction
 def _fetch(typing: Any, records: Any, at: Any, row: Any) -> Any:
     def made(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         given = _Arguments(context, builder, signature.args, values)
         byte = ir.IntType(8).as_pointer()
         place = builder.bitcast(given.pointer(0, given.index(1), given.index(2)), byte)
         kind = ir.FunctionType(ir.VoidType(), [byte, _INDEX, _INDEX, _INDEX])
-        hint = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
+        hint = _build.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
         # For reading, into the second cache, of data.
         builder.call(hint, [place, *(ir.Constant(_INDEX, value) for value in (0, 2, 1))])
         return context.get_dummy_value()

@@ -111,7 +111,8 @@ class EvidenceModel:
                     kept_back = gained(start, log_weight, withheld_share)
             else:
                 self._age(kept, served, log_weight)
-            cloud = Cloud(cloud.state, kept_in(kept.now, memory.width), memory)
+            now = kept_in(kept.now, memory.width)
+            cloud = Cloud(cloud.state, now, memory)
             for bound in reading.bounds:
                 predicted, own, cells = self._looked_up(pixel, bound.cells, rough=False)
                 fingerprint.weigh_by_bound(
@@ -126,7 +127,7 @@ class EvidenceModel:
                 counted = log_weight - kept_back
             if beyond.size:
                 unknown = reading.radio_under_null(other)
-                odds = memory.beyond_odds(cloud.kept, beyond)
+                odds = memory.beyond_odds(now, beyond)
                 if counted is not None:
                     share = self.evidence.levels.tracking_share
                     counted_unknown = reading.radio_under_null(share * other)
@@ -135,7 +136,7 @@ class EvidenceModel:
                 held = gained(before, log_weight[beyond], 1.0)
                 at_edge = beyond_edge(odds, held, unknown)
                 log_weight[beyond] = before + at_edge.gained
-                memory.keep_beyond_odds(cloud.kept, beyond, at_edge.log_odds)
+                memory.keep_beyond_odds(now, beyond, at_edge.log_odds)
         for term in reading.terms:
             log_likelihood = term.log_likelihood(cloud.state)
             log_weight += log_likelihood
