@@ -53,7 +53,7 @@ class Prediction(NamedTuple):
     share: float
 
 
-@njit(inline="always")
+@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
 def add_levels(
     kept: Floats32,
     count: int,
@@ -109,7 +109,7 @@ def add_levels(
         log_weight[j] += weight * total[j]
 
 
-@njit(inline="always")
+@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
 def add_absence(
     kept: Floats32,
     count: int,
@@ -264,7 +264,7 @@ def in_fours(gain: Floats32) -> Floats32:
     return whole
 
 
-@njit(inline="always")
+@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
 def _corrected(kept: Floats32, count: int, gain: Floats32, steps: Floats32) -> None:
     """Add gains (K, D) times steps (K, block), K by fours, to the means of a block, in place."""
     half = (gain.shape[1] - 1) // 2
