@@ -100,6 +100,8 @@ class MotionStep(EqualByValue):
     turned_sd_rad : float
         Deviation of a change of heading that was not measured, of a step to all sides; headings
         that turns add up to are unknown by it from there on.
+    rows : int
+        How many measured steps it is the sum of, each with errors of its own.
     """
 
     step_m: float
@@ -108,6 +110,7 @@ class MotionStep(EqualByValue):
     spread_m: float = float("nan")
     sampling_sd_m: float = 0.0
     turned_sd_rad: float = 0.0
+    rows: int = 1
 
     @property
     def is_undirected(self) -> bool:

@@ -38,7 +38,10 @@ class Copies:
 
     def made(self) -> Floats32:
         """Return what each particle keeps, shape (W, N)."""
-        return np.take(self.of, self.chosen, axis=1)
+        # As they lie in memory: what a particle keeps follows each other there, or rows do.
+        if self.of.flags.c_contiguous:
+            return np.take(self.of, self.chosen, axis=1)
+        return np.take(self.of.T, self.chosen, axis=0).T
 
 
 def copies_of(kept: Floats32 | Copies, chosen: Ints32) -> Copies:

@@ -1,9 +1,9 @@
 """Compiled kernels of :mod:`mapfilter.models.level_errors`: levels and absent cells as evidence.
 
 Hypotheses go through in blocks that stay in the cache; within a block each loop runs over its
-hypotheses, so that the arithmetic is vectorised. What hypotheses keep has shape (W, N): a row for
+hypotheses, so that the arithmetic is vectorised. A block has a row for each number of a record:
 each slot's slow error, each fast one, that of the device, then the log odds of each slot's fault.
-Those that change hypotheses take the first of them, and the end, before other arguments.
+:mod:`mapfilter.models.report_kernel` fills the rows from records and writes them back.
 """
 
 from __future__ import annotations
@@ -15,22 +15,19 @@ from numba import njit
 
 from mapfilter._kernels import exp32, log32
 from mapfilter._types import Bytes, Floats, Floats32, Ints32
-from mapfilter.models.ageing import Ageing, age
 from mapfilter.models.cell_faults import mixed, mixed_but_for_logarithm
 from mapfilter.models.fingerprint import REACH_SD, STEPS_PER_SD
+from mapfilter.models.record_tiles import fetch
 
 _F = np.float32
-_BLOCK = 128
+BLOCK = 128
 """Hypotheses of a block: what they keep, and the steps of a report, fit into the first cache."""
-_AGED = 1024
-"""Hypotheses that are aged at a time: longer pieces of rows are read faster, and what they keep
-still fits into the second cache."""
 _HALF, _ONE, _ZERO = _F(0.5), _F(1.0), _F(0.0)
 LOG_ROOT_TWO_PI = _F(0.9189385)
 
 
 class LevelTerms(NamedTuple):
-    """One report prepared for :func:`weigh_by_levels` or :func:`weigh_by_absence`.
+    """One report prepared for :func:`add_levels` or :func:`add_absence`.
 
     ``gain`` (K, 2S + 1) and ``variance_db2`` (K,) are those of sequential Kalman updates;
     ``other`` (K,) the log-likelihoods of the levels if the prediction is wrong.
@@ -57,68 +54,77 @@ class Prediction(NamedTuple):
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
-def weigh_by_levels(
-    begin: int,
-    stop: int,
-    ageing: Ageing,
+def add_levels(
+    kept: Floats32,
+    count: int,
     pixel: Ints32,
     predicted: Prediction,
     terms: LevelTerms,
-    weight: float,
+    gain: Floats32,
+    upon: Floats32,
+    steps: Floats32,
+    more: Floats32,
+    factors: Floats32,
+    total: Floats32,
+    weight: np.float32,
     log_weight: Floats,
+    before: Floats32,
+    ahead: Ints32,
 ) -> None:
-    """Age what hypotheses keep, add the log-likelihood of levels to weights, and update both.
+    """Add the log-likelihood of levels to the weights of a block, and update its rows, in place.
 
-    All of that is done for some hypotheses before the next, while what they keep is in the cache.
+    ``gain`` and ``upon`` are those of :func:`in_fours` and :func:`gain_of_sums`. The arrays behind
+    them are room for ``gain.shape[0]`` steps (those behind the last one are zeros), and rows.
+    Meanwhile the records ``ahead`` of ``before`` are fetched, some with each level.
     """
-    kept, means = ageing.now, terms.gain.shape[1]
-    w = _F(weight)
-    gain, upon = _in_fours(terms.gain), _gain_of_sums(terms)
-    steps, more = np.zeros((gain.shape[0], _BLOCK), np.float32), np.empty(_BLOCK, np.float32)
-    total, factors = np.empty(_BLOCK, np.float32), np.empty(_BLOCK, np.float32)
-    for first in range(begin, stop, _BLOCK):
-        if (first - begin) % _AGED == 0:
-            age(first, min(first + _AGED, stop), ageing)
-        count, into = min(_BLOCK, stop - first), log_weight[first:]
-        total[:], factors[:] = _ZERO, _ONE
-        for k in range(terms.cell.size):
-            s, cell, innovation = terms.slot[k], terms.cell[k], steps[k]
-            _look_up(predicted, pixel[first:], count, cell, innovation, more)
-            _less_errors(kept, first, count, s, terms.level_dbm[k], innovation)
-            _less_steps(upon[k], steps, k, count, innovation)
-            odds = kept[means + s, first:]
-            own, other = terms.variance_db2[k], terms.other[k]
-            # Two loops of half the length: more hypotheses are under way at a time.
-            for j in range(count):
-                v, variance = innovation[j], own + more[j]
-                per = _ONE / variance
-                more[j] = -_HALF * (v * v * per + log32(variance))
-                innovation[j] = v * own * per
-            for j in range(count):
-                fine, gained, factor, odds[j] = mixed_but_for_logarithm(odds[j], other, more[j])
-                total[j] += gained
-                factors[j] *= factor
-                innovation[j] = fine * innovation[j]
-            # One logarithm for four levels.
-            if k % 4 == 3 or k == terms.cell.size - 1:
-                for j in range(count):
-                    total[j] -= log32(factors[j])
-                    factors[j] = _ONE
-        _corrected(kept, first, count, gain, steps)
+    means, levels = terms.gain.shape[1], terms.cell.size
+    total[:], factors[:] = _ZERO, _ONE
+    for k in range(terms.cell.size):
+        for i in range(ahead.size * k // levels, ahead.size * (k + 1) // levels):
+            fetch(before, ahead[i])
+        s, cell, innovation = terms.slot[k], terms.cell[k], steps[k]
+        _look_up(predicted, pixel, count, cell, innovation, more)
+        _less_errors(kept, means, count, s, terms.level_dbm[k], innovation)
+        _less_steps(upon[k], steps, k, count, innovation)
+        odds = kept[means + s]
+        own, other = terms.variance_db2[k], terms.other[k]
+        # Two loops of half the length: more hypotheses are under way at a time.
         for j in range(count):
-            into[j] += w * total[j]
+            v, variance = innovation[j], own + more[j]
+            per = _ONE / variance
+            more[j] = -_HALF * (v * v * per + log32(variance))
+            innovation[j] = v * own * per
+        for j in range(count):
+            fine, gained, factor, odds[j] = mixed_but_for_logarithm(odds[j], other, more[j])
+            total[j] += gained
+            factors[j] *= factor
+            innovation[j] = fine * innovation[j]
+        # One logarithm for four levels.
+        if k % 4 == 3 or k == terms.cell.size - 1:
+            for j in range(count):
+                total[j] -= log32(factors[j])
+                factors[j] = _ONE
+    _corrected(kept, count, gain, steps)
+    for j in range(count):
+        log_weight[j] += weight * total[j]
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
-def weigh_by_absence(
-    begin: int,
-    stop: int,
+def add_absence(
     kept: Floats32,
+    count: int,
     pixel: Ints32,
     predicted: Prediction,
     terms: LevelTerms,
+    gain: Floats32,
+    upon: Floats32,
     table: Floats32,
-    weight: float,
+    steps: Floats32,
+    per_sd: Floats32,
+    right: Floats32,
+    total: Floats32,
+    place: Ints32,
+    weight: np.float32,
     log_weight: Floats,
 ) -> None:
     """Add the log-likelihood that cells are below a level, and update as above, in place.
@@ -127,42 +133,35 @@ def weigh_by_absence(
     the truncated normal distribution.
     """
     means = terms.gain.shape[1]
-    w = _F(weight)
     middle, last = _F(REACH_SD * STEPS_PER_SD) + _HALF, _F(2 * REACH_SD * STEPS_PER_SD)
-    gain = _in_fours(terms.gain)
-    steps, per_sd = np.zeros((gain.shape[0], _BLOCK), np.float32), np.empty(_BLOCK, np.float32)
-    right, total = np.empty(_BLOCK, np.float32), np.empty(_BLOCK, np.float32)
-    place, upon = np.empty(_BLOCK, np.int32), _gain_of_sums(terms)
-    for first in range(begin, stop, _BLOCK):
-        count, into = min(_BLOCK, stop - first), log_weight[first:]
-        total[:] = _ZERO
-        for k in range(terms.cell.size):
-            s, cell, below = terms.slot[k], terms.cell[k], steps[k]
-            _look_up(predicted, pixel[first:], count, cell, below, per_sd)
-            _less_errors(kept, first, count, s, terms.level_dbm[k], below)
-            _less_steps(upon[k], steps, k, count, below)
-            odds = kept[means + s, first:]
-            own, other = terms.variance_db2[k], terms.other[k]
-            for j in range(count):
-                per = _ONE / np.sqrt(own + per_sd[j])
-                z = below[j] * per
-                at_step = z * _F(STEPS_PER_SD) + middle
-                at_step = at_step if at_step > _ZERO else _ZERO
-                at_step = at_step if at_step < last else last
-                below[j], per_sd[j], place[j] = z, per, np.int32(at_step)
-            for j in range(count):
-                right[j] = table[np.uint32(place[j])]
-            for j in range(count):
-                fine, gained, odds[j] = mixed(odds[j], other, right[j])
-                total[j] += gained
-                # Above six deviations the truncation moves nothing, and the density is none.
-                z = below[j] if below[j] > _F(-8.0) else _F(-8.0)
-                hazard = exp32(-_HALF * z * z - LOG_ROOT_TWO_PI - right[j])
-                hazard = hazard if z < _F(6.0) else _ZERO
-                below[j] = -fine * hazard * own * per_sd[j]
-        _corrected(kept, first, count, gain, steps)
+    total[:] = _ZERO
+    for k in range(terms.cell.size):
+        s, cell, below = terms.slot[k], terms.cell[k], steps[k]
+        _look_up(predicted, pixel, count, cell, below, per_sd)
+        _less_errors(kept, means, count, s, terms.level_dbm[k], below)
+        _less_steps(upon[k], steps, k, count, below)
+        odds = kept[means + s]
+        own, other = terms.variance_db2[k], terms.other[k]
         for j in range(count):
-            into[j] += w * total[j]
+            per = _ONE / np.sqrt(own + per_sd[j])
+            z = below[j] * per
+            at_step = z * _F(STEPS_PER_SD) + middle
+            at_step = at_step if at_step > _ZERO else _ZERO
+            at_step = at_step if at_step < last else last
+            below[j], per_sd[j], place[j] = z, per, np.int32(at_step)
+        for j in range(count):
+            right[j] = table[np.uint32(place[j])]
+        for j in range(count):
+            fine, gained, odds[j] = mixed(odds[j], other, right[j])
+            total[j] += gained
+            # Above six deviations the truncation moves nothing, and the density is none.
+            z = below[j] if below[j] > _F(-8.0) else _F(-8.0)
+            hazard = exp32(-_HALF * z * z - LOG_ROOT_TWO_PI - right[j])
+            hazard = hazard if z < _F(6.0) else _ZERO
+            below[j] = -fine * hazard * own * per_sd[j]
+    _corrected(kept, count, gain, steps)
+    for j in range(count):
+        log_weight[j] += weight * total[j]
 
 
 @njit(error_model="numpy", cache=True)
@@ -222,7 +221,7 @@ def _look_up(
 
 
 @njit(inline="always")
-def _gain_of_sums(terms: LevelTerms) -> Floats32:
+def gain_of_sums(terms: LevelTerms) -> Floats32:
     """Return by how much the error of a term's level (row) moves with each step (column)."""
     count, means = terms.gain.shape
     slots = (means - 1) // 2
@@ -236,12 +235,10 @@ def _gain_of_sums(terms: LevelTerms) -> Floats32:
 
 @njit(inline="always")
 def _less_errors(
-    kept: Floats32, first: int, count: int, slot: int, level_dbm: np.float32, predicted: Floats32
+    kept: Floats32, means: int, count: int, slot: int, level_dbm: np.float32, predicted: Floats32
 ) -> None:
     """Replace predicted levels of a block by how far a level is above them and their errors."""
-    slots = (kept.shape[0] - 1) // 3
-    slow, fast = kept[slot, first:], kept[slots + slot, first:]
-    device = kept[2 * slots, first:]
+    slow, fast, device = kept[slot], kept[(means - 1) // 2 + slot], kept[means - 1]
     for j in range(count):
         predicted[j] = level_dbm - predicted[j] - slow[j] - fast[j] - device[j]
 
@@ -258,7 +255,7 @@ def _less_steps(
 
 
 @njit(inline="always")
-def _in_fours(gain: Floats32) -> Floats32:
+def in_fours(gain: Floats32) -> Floats32:
     """Return gains (K, D) with rows of zeros behind them: as many as four go into."""
     whole = np.zeros(((gain.shape[0] + 3) // 4 * 4, gain.shape[1]), dtype=np.float32)
     for k in range(gain.shape[0]):
@@ -267,15 +264,15 @@ def _in_fours(gain: Floats32) -> Floats32:
     return whole
 
 
-@njit(inline="always")
-def _corrected(kept: Floats32, first: int, count: int, gain: Floats32, steps: Floats32) -> None:
+@njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
+def _corrected(kept: Floats32, count: int, gain: Floats32, steps: Floats32) -> None:
     """Add gains (K, D) times steps (K, block), K by fours, to the means of a block, in place."""
     half = (gain.shape[1] - 1) // 2
     for k in range(0, gain.shape[0], 4):
         one, two, three, four = steps[k], steps[k + 1], steps[k + 2], steps[k + 3]
         # Slow and fast errors take the same steps.
         for d in range(half):
-            row, other = kept[d, first:], kept[half + d, first:]
+            row, other = kept[d], kept[half + d]
             a, b, c, e = gain[k, d], gain[k + 1, d], gain[k + 2, d], gain[k + 3, d]
             m = half + d
             f, g, h, i = gain[k, m], gain[k + 1, m], gain[k + 2, m], gain[k + 3, m]
@@ -285,7 +282,7 @@ def _corrected(kept: Floats32, first: int, count: int, gain: Floats32, steps: Fl
                     p, q, r, s = one[j], two[j], three[j], four[j]
                     row[j] = row[j] + a * p + b * q + c * r + e * s
                     other[j] = other[j] + f * p + g * q + h * r + i * s
-        row, d = kept[2 * half, first:], 2 * half
+        row, d = kept[2 * half], 2 * half
         a, b, c, e = gain[k, d], gain[k + 1, d], gain[k + 2, d], gain[k + 3, d]
         for j in range(count):
             row[j] = row[j] + a * one[j] + b * two[j] + c * three[j] + e * four[j]

@@ -18,6 +18,7 @@ from mapfilter._types import Floats, Floats32, Ints, Ints32
 from mapfilter.models.level_covariance import absence_gains, aged, sequential_updates
 from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.models.level_kernels import LevelTerms
+from mapfilter.models.record_tiles import kept_in, new_records
 
 SLOTS = 24
 """Most cells whose errors are estimated at a time."""
@@ -28,6 +29,7 @@ OTHER_DBM, OTHER_SD_DB = -90.0, 15.0
 
 _OTHER_M = 150.0
 _NEGLIGIBLE = 1e-3
+_ALL = slice(None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,8 +109,16 @@ class LevelMemory:
         return {name: self.__dict__[name] for name in self.__dataclass_fields__}
 
     def start(self, count: int, arrays: Any = np) -> Floats32:
-        """Return what hypotheses keep before the first report, (width, count), by a module."""
-        kept: Floats32 = arrays.zeros((self.width, count), dtype=np.float32)
+        """Return what hypotheses keep before the first report, (width, count), by a module.
+
+        On the processor these are records (:mod:`mapfilter.models.record_tiles`).
+        """
+        if arrays is np:
+            records = new_records(count, self.width)
+            records[:] = 0.0
+            kept = kept_in(records, self.width)
+        else:
+            kept = arrays.zeros((self.width, count), dtype=np.float32)
         kept[2 * self.slots + 1 :] = self.errors.fault_log_odds
         return kept
 
@@ -121,12 +131,12 @@ class LevelMemory:
         row: Floats32 = kept[self.fault_row(band)]
         return row
 
-    def beyond_odds(self, kept: Floats32) -> Floats32:
-        """Return the log odds that no prediction holds beyond the area, (N,).
+    def beyond_odds(self, kept: Floats32, at: Any = _ALL) -> Floats32:
+        """Return the log odds that no prediction holds beyond the area, of some hypotheses or all.
 
         They change over a distance as those of faults do, but towards even odds.
         """
-        odds: Floats32 = kept[-1] - np.float32(self.errors.fault_log_odds)
+        odds: Floats32 = kept[-1, at] - np.float32(self.errors.fault_log_odds)
         return odds
 
     def keep_beyond_odds(self, kept: Floats32, at: Any, log_odds: Any) -> None:
@@ -184,10 +194,12 @@ class LevelMemory:
         prior[np.ix_(slots + held_now, slots + held_now)] = self.errors.fast_db**2 * correlation
         prior[-1, -1] = self.errors.device_db**2
         if not in_place:
-            kept = kept.copy()
-        placed = arrays_of(kept).asarray
+            kept = kept.copy(order="K")
+        arrays = arrays_of(kept)
+        placed = arrays.asarray
         for part in (0, slots):
-            now = placed(by.astype(np.float32)) @ kept[placed(part + rest)] if rest.size else 0.0
+            known = arrays.ascontiguousarray(kept[placed(part + rest)])
+            now = placed(by.astype(np.float32)) @ known if rest.size else 0.0
             kept[placed(part + at)] = now
         kept[placed(2 * slots + 1 + at)] = self.errors.fault_log_odds
         other_dbm, other_db2, used = self.other_dbm.copy(), self.other_db2.copy(), self.used.copy()

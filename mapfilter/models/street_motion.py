@@ -146,23 +146,27 @@ def moving(
     errors: MotionErrors,
     key: np.uint64,
     sampling_sd_m: float = 0.0,
+    rows: int = 1,
 ) -> tuple[Call, Floats32]:
-    """Return the call that does what :func:`move` does, and the array that it fills."""
-    long_m, length, noise = noise_of_step(step_m, errors, sampling_sd_m)
+    """Return the call that does what :func:`move` does, and the array that it fills.
+
+    ``rows`` is how many measured steps the step is the sum of.
+    """
+    long_m, length, noise = noise_of_step(step_m, errors, sampling_sd_m, rows)
     moved = np.empty_like(state)
     return (_move, state, long_m, length, heading_rad, noise, key, moved), moved
 
 
 def noise_of_step(
-    step_m: float, errors: MotionErrors, sampling_sd_m: float
+    step_m: float, errors: MotionErrors, sampling_sd_m: float, rows: int = 1
 ) -> tuple[float, float, StepNoise]:
-    """Return the mean step (m), the length travelled (m), and the noise of a step."""
+    """Return the mean step (m), the length travelled (m), and the noise of a step of some rows."""
     length = abs(step_m)
     sampling_sd_m = sampling_sd_m if length > 0 else 0.0
     root = length**0.5
     white_rad = errors.white_rad
     # A step shorter than the typical one is a part of it, with the same noise over its length.
-    parts = max(errors.typical_step_m / length, 1.0) ** 0.5 if length > 0 else 1.0
+    parts = max(errors.typical_step_m / length, 1.0 / rows) ** 0.5 if length > 0 else 1.0
     turned, stretched = exp(-length / errors.heading_m), exp(-length / errors.stretch_m)
     noise = StepNoise(
         hypot(errors.step_sd_m * (length / errors.typical_step_m) ** 0.5, sampling_sd_m),
@@ -175,12 +179,17 @@ def noise_of_step(
         errors.stretch_sd * (1 - stretched**2) ** 0.5,
         1 - exp(-errors.disturbances_per_m * length),
         errors.disturbed_rad,
+        (rows + 1) / (2 * rows),
     )
     return step_m * exp(0.5 * white_rad**2), length, noise
 
 
 class StepNoise(NamedTuple):
-    """Standard deviations and factors of one step."""
+    """Standard deviations and factors of one step.
+
+    ``late`` is the share of a change of the deviations with which the whole step is turned and
+    stretched: of one row all of it, of several what their mean has of it.
+    """
 
     along_m: float
     across_m: float
@@ -192,6 +201,7 @@ class StepNoise(NamedTuple):
     stretch: float
     jump: float
     jump_rad: float
+    late: float = 1.0
 
 
 @njit(error_model="numpy", fastmath={"contract"}, cache=True, nogil=True)
@@ -212,6 +222,7 @@ def _move(
     turn_keep, turn_sd = _F(noise.turn_keep), _F(noise.turn_rad)
     stretch_keep, stretch_sd = _F(noise.stretch_keep), _F(noise.stretch)
     jump, jump_sd = _F(noise.jump), _F(noise.jump_rad)
+    late, early = _F(noise.late), _F(1.0 - noise.late)
     east, north = state[0, first:stop], state[1, first:stop]
     bias, scale = state[2, first:stop], state[3, first:stop]
     turn, stretch, rate = state[5, first:stop], state[6, first:stop], state[7, first:stop]
@@ -229,8 +240,9 @@ def _move(
         beside = turn_keep * turn[i] + turn_sd * e
         beside = jump_sd * e if _F(u) < jump else beside
         longer = stretch_keep * stretch[i] + stretch_sd * f
-        cosine, sine = cos_sin32(wrap32(heading + lasting + beside))
-        along = long * exp32(steady + longer) + along_sd * a
+        aside, further = late * beside + early * turn[i], late * longer + early * stretch[i]
+        cosine, sine = cos_sin32(wrap32(heading + lasting + aside))
+        along = long * exp32(steady + further) + along_sd * a
         across = across_sd * b
         to_bias[i] = lasting
         to_scale[i] = steady

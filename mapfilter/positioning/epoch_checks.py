@@ -23,6 +23,7 @@ _COLUMNS = {table: {column.name: column for column in columns} for table, column
 _TIME = SCHEMA["motion"][0]
 _SPREAD = Column("spread_m", 0, inf, "metres >= 0")
 _TURNED = Column("turned_sd_rad", 0, 1e6, "radians >= 0")
+_ROWS = Column("rows", 1, 1e6, "a number of measured steps, 1 or more")
 _OF_HEADINGS = (
     "degrees given for radians, or headings that count on beyond a turn; "
     "mapfilter.angles.wrap_one_rad wraps one"
@@ -37,6 +38,7 @@ _FIELDS: dict[type, dict[str, Column]] = {
         "spread_m": _SPREAD,
         "sampling_sd_m": _COLUMNS["motion"]["sampling_sd_m"],
         "turned_sd_rad": _TURNED,
+        "rows": _ROWS,
     },
     ReportRow: {
         name: _COLUMNS["radio"][name]
@@ -65,8 +67,8 @@ _FIELDS: dict[type, dict[str, Column]] = {
 """The column of a log's tables that each field of a row is checked by."""
 _FLOATS = ("timing_advance",)
 """Whole numbers that rows hold as floats, NaN where they are missing."""
-_ALWAYS = ("time_s", "sampling_sd_m", "turned_sd_rad")
-"""Numbers that are never missing; 0 where there is no such error."""
+_ALWAYS = ("time_s", "sampling_sd_m", "turned_sd_rad", "rows")
+"""Numbers that are never missing: errors are 0 where there are none, rows 1."""
 _RANGES = {
     kind: tuple(
         (name, column.low, column.high, column.kind == "integer" and name not in _FLOATS)
@@ -194,8 +196,6 @@ def _is_well(epoch: Any) -> bool:
     try:
         rows = (*epoch.motion, *epoch.radio, *epoch.pseudoranges, *epoch.tdoa)
         rows = rows if epoch.gnss is None else (*rows, epoch.gnss)
-        # Arrays of one number compare as numbers do, but have no hash.
-        hash(rows)
         return all(map(_row_is_well, rows))
     except (TypeError, ValueError, KeyError):
         return False
@@ -218,6 +218,8 @@ def _row_is_well(row: Any) -> bool:
         return _report_is_well(row)
     for name, low, high, may_lack in _RANGES[kind]:
         value = getattr(row, name)
+        # Arrays of one number compare as numbers do, but have no hash.
+        hash(value)
         if (may_lack and value is None) or low <= value <= high:
             continue
         # NaN is the only number that is not itself.
@@ -229,6 +231,7 @@ def _row_is_well(row: Any) -> bool:
             return False
     if kind is Pseudorange:
         x_m, y_m, z_m = row.place_m
+        hash((x_m, y_m, z_m))
         return all(_PLACE.low <= one <= _PLACE.high or one != one for one in (x_m, y_m, z_m))
     return True
 
@@ -238,6 +241,7 @@ def _report_is_well(row: Any) -> bool:
     carrier, code, level, censored, advance = _OF_REPORT
     arfcn, bsic, bound = row.arfcn, row.bsic, row.censored
     level_dbm, steps = row.level_dbm, row.timing_advance
+    hash((arfcn, bsic, bound, level_dbm, steps))
     return bool(
         row.role in _ROLES
         and (row.cell is None or isinstance(row.cell, str))

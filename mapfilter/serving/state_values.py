@@ -19,6 +19,7 @@ from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.level_memory import LevelMemory
+from mapfilter.positioning.bayes.beliefs.legs import Lead, Leg
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, NullHypothesis
@@ -67,6 +68,8 @@ _CLASSES: dict[str, type] = {
         HalfTurns,
         HeldOtherwise,
         Hold,
+        Lead,
+        Leg,
         LevelErrors,
         LevelMemory,
         MirroredTwin,

@@ -31,6 +31,7 @@ from mapfilter.models.level_errors import LevelReport
 from mapfilter.models.street_motion import OFF, STATES
 from mapfilter.models.way_map import all_inside, weight_inside
 from mapfilter.positioning.bayes.area.area_map import AreaMap
+from mapfilter.positioning.bayes.beliefs.legs import Lead
 from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.sources.evidence import RadioReading
 from mapfilter.positioning.fingerprints.likelihood_kernel import add_reading
@@ -91,9 +92,10 @@ def compile_motion() -> None:
 
 
 def compile_summaries() -> None:
-    """Compile the summary of a belief."""
+    """Compile the summary of a belief, and how it goes on by dead reckoning."""
     model, cloud, _ = _made()
     weight = np.full(_PARTICLES, 1 / _PARTICLES, dtype=np.float32)
+    Lead.of(cloud.state, weight, np.zeros(STATES))
     summarise(cloud.state, weight, model.bins)
     flattened(cloud.state, weight, model.bins, 0.5)
 

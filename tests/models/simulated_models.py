@@ -93,8 +93,8 @@ def test_pixels():
 
 
 def test_ageing():
-    _, (given,), (expected,) = done(ageing)
-    kept, usual = given.before, given.fault_log_odds
+    p, (given,), (expected,) = done(ageing)
+    kept, usual = np.ascontiguousarray(p.kept), given.fault_log_odds
     cuda_reports.age(kept, given.decay, given.fault_keep, usual)
     np.testing.assert_allclose(kept, expected, rtol=1e-6, atol=1e-6)
 
@@ -118,19 +118,19 @@ def test_the_serving_cell(cell):
 def test_levels():
     p, (*_, predicted, terms, weight, _), _ = done(levels)
     found = Particles(COUNT)
-    cuda_reports.weigh_by_levels(found.kept, p.pixel, predicted, terms, weight, found.log_weight)
+    kept = np.ascontiguousarray(found.kept)
+    cuda_reports.weigh_by_levels(kept, p.pixel, predicted, terms, weight, found.log_weight)
     np.testing.assert_allclose(found.log_weight, p.log_weight, rtol=0, atol=2e-5)
-    np.testing.assert_allclose(found.kept, p.kept, rtol=1e-4, atol=2e-4)
+    np.testing.assert_allclose(kept, p.kept, rtol=1e-4, atol=2e-4)
 
 
 def test_absence():
     p, (*_, predicted, terms, table, weight, _), _ = done(absence)
     found = Particles(COUNT)
-    cuda_reports.weigh_by_absence(
-        found.kept, p.pixel, predicted, terms, table, weight, found.log_weight
-    )
+    kept = np.ascontiguousarray(found.kept)
+    cuda_reports.weigh_by_absence(kept, p.pixel, predicted, terms, table, weight, found.log_weight)
     np.testing.assert_allclose(found.log_weight, p.log_weight, rtol=0, atol=2e-5)
-    np.testing.assert_allclose(found.kept, p.kept, rtol=1e-4, atol=2e-4)
+    np.testing.assert_allclose(kept, p.kept, rtol=1e-4, atol=2e-4)
 
 
 @pytest.mark.parametrize("censored", [-1, 0, 1])

@@ -5,6 +5,7 @@ import pytest
 
 from mapfilter.filters.copies import Copies, columns_of, copies_of
 from mapfilter.models.ageing import Ageing, age, as_it_is
+from mapfilter.models.record_tiles import kept_in, new_records, records_of
 
 WIDTH, MEANS, COUNT = 5, 3, 1500
 DECAY = np.array([0.9, 0.5, 1.0], dtype=np.float32)
@@ -23,9 +24,10 @@ def aged(kept):
     return np.vstack([means, faults])
 
 
-def ageing(kept, due=(True,) * WIDTH):
-    now = np.full((WIDTH, kept.shape[1]), np.nan, dtype=np.float32)
-    return Ageing(*columns_of(kept), DECAY, KEEP, USUAL, np.array(due), now)
+def ageing(kept):
+    now, (of, chosen) = new_records(kept.shape[1], WIDTH), columns_of(kept)
+    now[:] = np.nan
+    return Ageing(records_of(of), chosen, DECAY, KEEP, USUAL, True, now)
 
 
 def test_copies_are_aged_as_the_columns_that_they_are_of(before):
@@ -34,7 +36,8 @@ def test_copies_are_aged_as_the_columns_that_they_are_of(before):
     untouched = before.copy()
     for first, stop in ((0, 700), (700, 701), (701, COUNT)):
         age(first, stop, found)
-    np.testing.assert_allclose(found.now, aged(before[:, chosen]), rtol=1e-6, atol=1e-6)
+    now = kept_in(found.now, WIDTH)
+    np.testing.assert_allclose(now, aged(before[:, chosen]), rtol=1e-6, atol=1e-6)
     np.testing.assert_array_equal(before, untouched)
     # Copies of copies are those of the first ones.
     again = np.array([5, 5, 1499], dtype=np.int32)
@@ -45,21 +48,12 @@ def test_copies_are_aged_as_the_columns_that_they_are_of(before):
 def test_what_has_columns_of_its_own_is_aged_in_their_order(before):
     found = ageing(before)
     age(0, 40, found)
-    np.testing.assert_allclose(found.now, aged(before), rtol=1e-6, atol=1e-6)
-
-
-@pytest.mark.parametrize("row", [1, 4])
-def test_rows_may_be_aged_apart(before, row):
-    chosen = np.arange(39, -1, -1, dtype=np.int32)
-    found, expected = ageing(copies_of(before, chosen)), aged(before[:, ::-1])
-    age(0, 40, found.of_row(row))
-    np.testing.assert_allclose(found.now[row], expected[row], rtol=1e-6, atol=1e-6)
-    assert np.isnan(np.delete(found.now, row, axis=0)).all()
-    age(0, 40, found.without_row(row))
-    np.testing.assert_allclose(found.now, expected, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(kept_in(found.now, WIDTH), aged(before), rtol=1e-6, atol=1e-6)
 
 
 def test_what_is_as_it_should_be_stays(before):
-    found = as_it_is(before)
+    records = records_of(before)
+    found = as_it_is(records)
     age(0, 40, found)
-    assert found.now is before
+    assert found.now is records
+    np.testing.assert_array_equal(kept_in(records, WIDTH), before)

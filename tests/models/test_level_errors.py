@@ -9,13 +9,15 @@ import scalar_oracle as oracle
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import norm, truncnorm
+from weighed_reports import weigh_by_absence, weigh_by_levels
 
 from mapfilter.errors import ConfigError
 from mapfilter.models.ageing import Ageing, age, as_it_is
 from mapfilter.models.fingerprint import bound_table
 from mapfilter.models.level_errors import LevelErrors, LevelReport, roughness
-from mapfilter.models.level_kernels import Prediction, weigh_by_absence, weigh_by_levels
+from mapfilter.models.level_kernels import Prediction
 from mapfilter.models.level_memory import SLOTS, LevelMemory
+from mapfilter.models.record_tiles import kept_in, new_records, records_of
 
 SITE = np.array([0, 0, 1, 1, 1, 2])
 PIXELS = 30
@@ -43,29 +45,30 @@ def weighed(memory, kept, pixel, table, given, rough_db=None):
     """Weigh hypotheses by one report, as the filter's model does; cells must fit into the slots."""
     errors, log_weight = memory.errors, np.zeros(pixel.size)
     memory, kept = memory.with_cells(np.concatenate([given.cell, given.absent]), kept)
-    kept = kept.copy()
+    records = records_of(kept).copy()
     memory, terms = memory.updated(given)
     rough = np.zeros(table.size, np.uint8) if rough_db is None else rough_db.ravel()
     pixel, flat, bands = pixel.astype(np.int32), table.ravel(), table.shape[1]
     predicted = Prediction(flat, rough, bands, errors.roughness)
-    as_now = as_it_is(kept)
+    as_now = as_it_is(records)
     weigh_by_levels(0, pixel.size, as_now, pixel, predicted, terms, errors.weight, log_weight)
     if given.absent.size:
         absent = memory.absence(given)
         table, weight = bound_table(), errors.weight
-        weigh_by_absence(0, pixel.size, kept, pixel, predicted, absent, table, weight, log_weight)
-    return memory, kept, log_weight
+        given = pixel, predicted, absent, table, weight, log_weight
+        weigh_by_absence(0, pixel.size, records, *given)
+    return memory, kept_in(records, memory.width), log_weight
 
 
 def moved(memory, kept, length_m):
     errors = memory.errors
     memory, decay = memory.after(length_m)
     keep = exp(-length_m / errors.fault_m)
-    now, due = np.empty_like(kept), np.ones(kept.shape[0], dtype=bool)
+    before, now = records_of(kept), new_records(kept.shape[1], memory.width)
     each_its_own = np.empty(0, dtype=np.int32)
-    ageing = Ageing(kept, each_its_own, decay, keep, errors.fault_log_odds, due, now)
+    ageing = Ageing(before, each_its_own, decay, keep, errors.fault_log_odds, True, now)
     age(0, kept.shape[1], ageing)
-    return memory, now
+    return memory, kept_in(now, memory.width)
 
 
 class Walk:

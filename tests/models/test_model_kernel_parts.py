@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from weighed_reports import weigh_by_absence, weigh_by_levels
 
 from mapfilter.filters.resampling import copy_with_jitter, taken
 from mapfilter.models import fingerprint
@@ -19,12 +20,9 @@ from mapfilter.models.fingerprint import (
     serving_table,
 )
 from mapfilter.models.level_errors import LevelErrors
-from mapfilter.models.level_kernels import (
-    LevelTerms,
-    Prediction,
-    weigh_by_absence,
-    weigh_by_levels,
-)
+from mapfilter.models.level_kernels import LevelTerms, Prediction
+from mapfilter.models.record_tiles import kept_in, new_records
+from mapfilter.models.report_kernel import Heard, Served, weigh_by_report
 from mapfilter.models.street_motion import STATES, MotionErrors, moving
 from mapfilter.models.way_map import MapWeights, WayMap, weigh_by_ways
 
@@ -44,7 +42,10 @@ class Particles:
         self.state[0] = rng.uniform(-20.0, COLS * PIXEL_M + 20.0, count)
         self.state[1] = rng.uniform(-20.0, ROWS * PIXEL_M + 20.0, count)
         self.state[4] = rng.uniform(0.0, 1.0, count)
-        self.kept = rng.normal(0.0, 4.0, (WIDTH, count)).astype(np.float32)
+        self.records = new_records(count, WIDTH)
+        self.records[:] = 0.0
+        self.kept = kept_in(self.records, WIDTH)
+        self.kept[:] = rng.normal(0.0, 4.0, (WIDTH, count))
         self.pixel = rng.integers(ROWS * COLS, size=count).astype(np.int32)
         self.log_weight = rng.normal(0.0, 1.0, count)
         self.weight = rng.random(count).astype(np.float32)
@@ -83,46 +84,46 @@ def pixels(p):
 
 def ageing(p):
     found = aged(p, np.empty(0, dtype=np.int32))
-    return age, [found], [found.now]
+    return age, [found], [kept_in(found.now, WIDTH)]
 
 
 def ageing_of_copies(p):
     found = aged(p, p.chosen)
-    return age, [found], [found.now]
+    return age, [found], [kept_in(found.now, WIDTH)]
 
 
 def aged(p, chosen):
-    now, due = np.full_like(p.kept, np.nan), np.ones(WIDTH, dtype=bool)
+    now = new_records(p.count, WIDTH)
+    now[:] = np.nan
     decay = np.linspace(0.1, 0.99, 2 * SLOTS + 1).astype(np.float32)
-    return Ageing(p.kept, chosen, decay, 0.97, LevelErrors().fault_log_odds, due, now)
+    return Ageing(p.records, chosen, decay, 0.97, LevelErrors().fault_log_odds, True, now)
 
 
 def serving(p):
-    odds = p.kept[2 * SLOTS + 2]
+    odds = p.kept[2 * SLOTS + 2].copy()
     bands, table = ServingBands(BANDS, 1, BANDS - 2, BANDS - 1), serving_table(ServingWeights())
     given_ = p.pixel, p.level_dbm, bands, table, 0.3, odds, -0.7
-    return fingerprint.weigh_by_serving, [*given_, p.log_weight], [p.kept, p.log_weight]
+    return fingerprint.weigh_by_serving, [*given_, p.log_weight], [odds, p.log_weight]
 
 
 def levels(p):
     predicted = Prediction(p.level_dbm, p.rough, BANDS, 0.3)
-    arguments = [as_it_is(p.kept), p.pixel, predicted, p.terms, 0.35, p.log_weight]
+    arguments = [as_it_is(p.records), p.pixel, predicted, p.terms, 0.35, p.log_weight]
     return weigh_by_levels, arguments, [p.kept, p.log_weight]
 
 
-def levels_of_aged_copies(p):
+def report_of_aged_copies(p):
     predicted, found = Prediction(p.level_dbm, p.rough, BANDS, 0.3), aged(p, p.chosen)
-    # One row has been aged and changed before.
-    age(0, p.count, found.of_row(2 * SLOTS + 2))
-    found = found.without_row(2 * SLOTS + 2)
-    found.now[2 * SLOTS + 2] += 1.0
-    arguments = [found, p.pixel, predicted, p.terms, 0.35, p.log_weight]
-    return weigh_by_levels, arguments, [found.now, p.log_weight]
+    bands, table = ServingBands(BANDS, 1, BANDS - 2, BANDS - 1), serving_table(ServingWeights())
+    served = Served(p.pixel, p.level_dbm, bands, table, 0.3, 2 * SLOTS + 2, -0.7)
+    heard, after_serving = Heard(p.pixel, predicted, p.terms), np.full(p.count, np.nan)
+    given_ = found, served, heard, heard, bound_table(), 0.35, p.log_weight, after_serving
+    return weigh_by_report, [*given_], [kept_in(found.now, WIDTH), p.log_weight, after_serving]
 
 
 def absence(p):
     predicted = Prediction(p.level_dbm, p.rough, BANDS, 0.3)
-    arguments = [p.kept, p.pixel, predicted, p.terms, bound_table(), 0.35, p.log_weight]
+    arguments = [p.records, p.pixel, predicted, p.terms, bound_table(), 0.35, p.log_weight]
     return weigh_by_absence, arguments, [p.kept, p.log_weight]
 
 
@@ -138,7 +139,7 @@ def weights_taken(p):
 
 
 PASSES = [
-    motion, ways, pixels, ageing, ageing_of_copies, serving, levels, levels_of_aged_copies, absence,
+    motion, ways, pixels, ageing, ageing_of_copies, serving, levels, report_of_aged_copies, absence,
     jittered, weights_taken,
 ]  # fmt: skip
 

@@ -10,6 +10,7 @@ from small_area import HEIGHT_M, ON_WAY, SOUTH_M, WEST_M, WIDTH_M, make_area
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.models.street_motion import STATES, STRETCH, TURN, MotionErrors
+from mapfilter.positioning.bayes.beliefs.legs import NO_LEG
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning
 from mapfilter.positioning.bayes.beliefs.smoothing import BayesSmoother, Kept
 from mapfilter.positioning.bayes.rivals.hold import Hold
@@ -211,6 +212,7 @@ def at(epoch, state, alternative=None, takeovers=0, hold=None, held=(), alone_fr
         hold=hold or Hold(),
         held=held,
         alone_from_m=alone_from_m,
+        leg=NO_LEG,
     )
 
 

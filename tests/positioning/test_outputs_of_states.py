@@ -9,6 +9,7 @@ import pytest
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import BeliefSummary
+from mapfilter.positioning.bayes.beliefs.legs import NO_LEG
 from mapfilter.positioning.bayes.state import BayesState, step_output
 
 AREA = SimpleNamespace(origin_m=(1000.0, 2000.0), matched_way=lambda *_: (7, 0.75))
@@ -29,7 +30,12 @@ def belief(summary=SUMMARY, count=3):
 def state(belief, status=Status.TRACKING, reported=None):
     null = SimpleNamespace(probability=0.125)
     return SimpleNamespace(
-        belief=belief, status=status, null=null, reported=reported, with_output=lambda one: one
+        belief=belief,
+        status=status,
+        null=null,
+        reported=reported,
+        leg=NO_LEG,
+        with_output=lambda one: one,
     )
 
 

@@ -9,6 +9,7 @@ import pytest
 from small_area import SOUTH_M, WEST_M, make_area
 
 from mapfilter.positioning.bayes.beliefs import smoothing
+from mapfilter.positioning.bayes.beliefs.legs import NO_LEG
 from mapfilter.positioning.bayes.beliefs.smoothing import BayesSmoother, Kept
 
 AREA = make_area()
@@ -38,6 +39,7 @@ def after_epoch(reckoned, belief, unit_m=1.0, **more):
         "held": (),
         "alone_from_m": nan,
         "hold": held_in(unit_m),
+        "leg": NO_LEG,
     }
     return SimpleNamespace(reckoning=way, belief=belief, **(usual | more))
 

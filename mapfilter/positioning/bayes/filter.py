@@ -7,7 +7,7 @@ belief or weighs it with them, and reports. Equal epochs and seeds give equal by
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import expm1
@@ -36,8 +36,9 @@ from mapfilter.positioning.bayes.sources.evidence import EvidenceSource, Evidenc
 from mapfilter.positioning.bayes.sources.map_source import MapSource
 from mapfilter.positioning.bayes.sources.radio import RadioSource
 from mapfilter.positioning.bayes.sources.timing import TimingSource
-from mapfilter.positioning.bayes.sources.usable import usable_epoch
-from mapfilter.positioning.bayes.state import BayesState, check_state, step_output
+from mapfilter.positioning.bayes.sources.usable import UsableEpoch, usable_epoch
+from mapfilter.positioning.bayes.state import BayesState, belief_here, check_state, step_output
+from mapfilter.positioning.bayes.waiting import waits
 from mapfilter.positioning.bayes.warm_up import run_kernels
 from mapfilter.positioning.bayes.weighing import Weighing
 from mapfilter.positioning.epoch_checks import (
@@ -199,12 +200,14 @@ class BayesPositioner(Filter[BayesState]):
         check_state(state, self.area)
         check_later(epoch, state.watch.times.epoch_s)
         check_generator(rng)
-        spacing_m, hold = state.particle_spacing_m, state.hold
+        spacing_m, hold, given = state.particle_spacing_m, state.hold, state
         state = _tracked(state)
         before, weighing = state.status, self._weighing
         usable = usable_epoch(state, epoch, by_ways=self.beliefs.by_ways)
         epoch, motion, radio = usable.epoch, usable.motion, usable.radio
-        state, unused = moved(self.beliefs, state, usable.watch, epoch, rng)
+        wait = self._waits(given, usable)
+        state, unused = moved(self.beliefs, state, usable.watch, epoch, rng, wait)
+        travelled_m = state.reckoning.travelled_m
         if motion is not Reason.USED:
             unused = [UnusedReading(epoch.time_s, "motion", "", motion)]
         unused += usable.unused
@@ -220,7 +223,8 @@ class BayesPositioner(Filter[BayesState]):
             if started is not None:
                 belief, sources = started
                 state = replace(state, belief=belief, sources={**state.sources, **sources})
-        else:
+        elif state.belief is not given.belief or not wait or not wait(travelled_m):
+            # Else nothing is read of it.
             moved_only = state.belief
             measured = usable.is_measured
             state, why = weighing.weighed(state, moved_only, updates, epoch, rng, measured=measured)
@@ -257,10 +261,15 @@ class BayesPositioner(Filter[BayesState]):
         The state moved to the epoch, the evidence, and whether motion was measured; with the
         generator as before the step these are its own.
         """
-        spacing_m, state = state.particle_spacing_m, _tracked(state)
+        spacing_m, given, state = state.particle_spacing_m, state, _tracked(state)
         usable = usable_epoch(state, epoch, by_ways=self.beliefs.by_ways)
-        state, _ = moved(self.beliefs, state, usable.watch, usable.epoch, rng)
+        wait = self._waits(given, usable)
+        state, _ = moved(self.beliefs, state, usable.watch, usable.epoch, rng, wait)
         return *self._weighing.collected(state, usable.epoch, spacing_m), usable.is_measured
+
+    def _waits(self, state: BayesState, usable: UsableEpoch) -> Callable[[float], bool] | None:
+        # Other sources may read beliefs at any epoch.
+        return None if self.more_sources else waits(self.beliefs, self._radio, state, usable)
 
     def for_scores(self) -> BayesPositioner:
         """Return the filter without ways, radii of 99 % and protection levels in its outputs."""
@@ -283,7 +292,7 @@ class BayesPositioner(Filter[BayesState]):
 
     def hypotheses(self, state: BayesState) -> Hypotheses | None:
         """Return the hypotheses of the belief."""
-        belief, (west, south) = state.belief, self.area.origin_m
+        belief, (west, south) = belief_here(state), self.area.origin_m
         if belief is None:
             return None
         return Hypotheses(

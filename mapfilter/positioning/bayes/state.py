@@ -10,8 +10,10 @@ from typing import Any, NamedTuple
 from mapfilter.errors import InputError, fail
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import empty_summary
+from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes.area.area_frame import AreaFrame
+from mapfilter.positioning.bayes.beliefs.legs import NO_LEG, Lead, Leg, moved_on
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning as DeadReckoning
 from mapfilter.positioning.bayes.beliefs.path import RecentPath
 from mapfilter.positioning.bayes.certainty import Recovery
@@ -96,6 +98,8 @@ class BayesState:
         none did.
     area : str
         Checksum of the area that it is of; empty where nobody states it.
+    leg : Leg
+        Steps by which its beliefs have not been moved yet.
     """
 
     belief: MapBelief | None = None
@@ -123,6 +127,7 @@ class BayesState:
     proven: bool = False
     alone_from_m: float = nan
     area: str = ""
+    leg: Leg = NO_LEG
 
     def with_output(self, reported: Reported) -> BayesState:
         """Return the state with its output."""
@@ -146,6 +151,7 @@ class BayesState:
             half_turns=self.half_turns.anew(),
             unaided=(),
             proven=False,
+            leg=NO_LEG,
         )
 
     @property
@@ -166,6 +172,14 @@ class BayesState:
             return FIRST_SPACING_M
         area_m2 = _STREET_SHARE * belief.bins.size_m**2 * belief.summary.effective_bins
         return max(sqrt(area_m2 / belief.count), _MIN_SPACING_M)
+
+
+def belief_here(state: BayesState) -> MapBelief | None:
+    """Return the belief with its hypotheses where dead reckoning has led them by now."""
+    belief, leg = state.belief, state.leg
+    if not leg.rows or not isinstance(belief, ParticleBelief):
+        return belief
+    return replace(belief, state=moved_on(belief.state, leg.gone_m(state.reckoning)))
 
 
 def check_state(state: BayesState, area: AreaFrame) -> None:
@@ -189,12 +203,16 @@ def check_state(state: BayesState, area: AreaFrame) -> None:
 
 
 class Reported(NamedTuple):
-    """An output, and the belief, the status and the probability of no hypothesis it was made of."""
+    """An output, and the belief, the status and the probability of no hypothesis it was made of.
+
+    ``lead`` is how that belief goes on by dead reckoning; None where nobody has asked yet.
+    """
 
     belief: MapBelief | None
     status: Status
     p_none: float
     output: StepOutput
+    lead: Lead | None = None
 
 
 def step_output(
@@ -208,16 +226,34 @@ def step_output(
 ) -> tuple[BayesState, StepOutput]:
     """Summarise the belief; ``reason`` is whether the epoch's report was used.
 
-    A phone that stands still has the same belief for hours, which is not summarised again.
+    A phone that stands still has the same belief for hours, which is not summarised again, nor is
+    one whose steps wait: its position goes on by dead reckoning.
     ``positions_only`` leaves out ways, the radius of 99 % and protection levels.
     """
     made_of = state.belief, state.status, state.null.probability
-    known = state.reported
-    if known is not None and known.belief is made_of[0] and known[1:3] == made_of[1:]:
-        fix = replace(known.output.fix, time_s=time_s, reason=reason)
-        return state, StepOutput(fix, known.output.evidence, unused, known.output.tail)
-    output = _output(area, state, time_s, reason, unused, positions_only=positions_only)
-    return state.with_output(Reported(*made_of, output)), output
+    known, leg = state.reported, state.leg
+    if known is None or known.belief is not made_of[0] or known[1:3] != made_of[1:]:
+        output = _output(area, state, time_s, reason, unused, positions_only=positions_only)
+        known = Reported(*made_of, output)
+        state = state.with_output(known)
+        if not leg.rows:
+            return state, output
+    state, east_m, north_m = _gone_on(state, known)
+    fix = replace(known.output.fix, time_s=time_s, east_m=east_m, north_m=north_m, reason=reason)
+    return state, StepOutput(fix, known.output.evidence, unused, known.output.tail)
+
+
+def _gone_on(state: BayesState, known: Reported) -> tuple[BayesState, float, float]:
+    """Return where a reported position has gone since; the state keeps what leads it on."""
+    fix, belief = known.output.fix, state.belief
+    if not state.leg.rows or not isinstance(belief, ParticleBelief):
+        return state, fix.east_m, fix.north_m
+    lead = known.lead
+    if lead is None:
+        lead = Lead.of(belief.state, belief.weight, belief.summary.mean)
+        state = state.with_output(known._replace(lead=lead))
+    east_m, north_m = lead.led_m(state.leg.gone_m(state.reckoning))
+    return state, fix.east_m + east_m, fix.north_m + north_m
 
 
 def _output(

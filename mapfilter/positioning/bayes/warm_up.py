@@ -22,7 +22,11 @@ def run_kernels(small: BayesPositioner) -> None:
     area, rng = small.area, np.random.default_rng(0)
     west, south = area.origin_m
     state = small.begin_at(west, south, 1.0, rng)
-    state, _ = small.step(state, Epoch(0.0, (MotionStep(1.0, 0.0),)), rng)
+    step = MotionStep(1.0, 0.0)
+    # The step waits, and the position goes on by dead reckoning.
+    state, _ = small.step(state, Epoch(0.0, (step,)), rng)
+    if state.belief is not None:
+        small.beliefs.by_compass[True].predict(state.belief, step, rng)
     if state.belief is not None and area.cell_ids:
         update, reading = small.beliefs.by_compass[True].update, _every_kind()
         belief, _ = update(state.belief, reading, rng)

@@ -255,6 +255,7 @@ class Weighing:
             proven=self._proven(state, now, before),
             alone_from_m=state.alone_from_m,
             area=state.area,
+            leg=state.leg,
         )
 
     def _proven(self, state: BayesState, now: Resolution, before: MapBelief) -> bool:

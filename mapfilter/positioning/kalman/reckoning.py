@@ -10,7 +10,7 @@ components of the state:
 linear about the mean of b and k. Headings that turns add up to are also off by a lasting error of
 their rate, r, such as a gyroscope's bias, which is a third component: b' = b + r Δt. Positions that
 are measured find them, and are followed by better dead reckoning. The noise w is of each step
-alone.
+alone; the rate wanders as time passes (:mod:`mapfilter.positioning.kalman.passing`).
 """
 
 from __future__ import annotations

@@ -21,6 +21,7 @@ from mapfilter.positioning.kalman.fixing import FixWeighing
 from mapfilter.positioning.kalman.lasting import Motion, extended_belief, extended_motion
 from mapfilter.positioning.kalman.level_errors import with_own_spread
 from mapfilter.positioning.kalman.models import SiteModels, compiled
+from mapfilter.positioning.kalman.passing import as_time_passes
 from mapfilter.positioning.kalman.place import (
     WITHIN_M,
     belief_tail,
@@ -32,6 +33,7 @@ from mapfilter.positioning.kalman.proof import Doubt
 from mapfilter.positioning.kalman.readings import SiteReadings, fix_covariance_m2, site_readings
 from mapfilter.positioning.kalman.reckoning import (
     ERRORS,
+    RATE,
     RECKONED,
     TURNED,
     after_each_other,
@@ -135,8 +137,9 @@ class KalmanStep:
             root = self.options.acceleration_mps_per_sqrt_s
             moving = constant_velocity(elapsed_s, root, noise="continuous")
             return (moving.transition, moving.noise, motion[2]), self._speed_mps() * elapsed_s
-        motion[1][self.where, self.where] = self.options.drift_m_per_sqrt_s**2 * elapsed_s
-        mean, options, gaps = self.belief.moments.mean, self.options, 0
+        moments, options, gaps = self.belief.moments, self.options, 0
+        mean = moments.mean
+        motion = as_time_passes(options, elapsed_s, float(moments.covariance[RATE, RATE]))
         for step in epoch.motion:
             self.reckoning, own, why = self.reckoning.moved(
                 step, epoch.time_s, options, mean[ERRORS]

@@ -57,7 +57,8 @@ class NumpyModel:
     def __init__(self, inputs: StepInputs, belief: ParticleBelief) -> None:
         self.model, self.motion = inputs.model, inputs.motion
         self.reading, self.levels = inputs.reading, inputs.levels
-        self.kept: Floats = array_of(belief.kept_unread).astype(np.float64)
+        kept = array_of(belief.kept_unread)
+        self.kept: Floats = np.ascontiguousarray(kept, dtype=np.float64)
         self.shared: LevelMemory = belief.shared
 
     @cached_property

@@ -1,19 +1,22 @@
-"""Changes of single beliefs besides steps: hypotheses carried on after a rest, phones turned."""
+"""Changes of single beliefs: hypotheses carried on after a rest, phones turned, steps as read."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import sqrt
+from typing import Any
 
 import numpy as np
 
 from mapfilter.angles import wrap_rad
-from mapfilter.filters.contract import Status
+from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.filters.grid import GridBelief
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.street_motion import BIAS, NORTH, MotionErrors, is_turned
 from mapfilter.models.street_motion import remounted as remounted_states
 from mapfilter.positioning.bayes.rivals.alternative import MapBelief
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.unmeasured import spread_m2
@@ -95,3 +98,21 @@ def remounted(
         return belief
     state = remounted_states(belief.state, length_m, motion, rng)
     return belief if state is belief.state else replace(belief, state=state)
+
+
+def moved_as_read(
+    one: HeldOtherwise, predict: Callable[..., Any], measured: MotionStep, rng: np.random.Generator
+) -> HeldOtherwise:
+    """Return a belief beside the main one, moved by a step as it reads it."""
+    as_read = one.hold.read(measured)
+    return replace(one, belief=predict(one.belief, assumed(as_read, one.belief), rng)[0])
+
+
+def assumed(step: MotionStep, belief: MapBelief) -> MotionStep:
+    """Return a step with the errors that a belief assumes: that of its sampling once it is tracked.
+
+    With it a belief that still searches would be too wide to be in one place for some way.
+    """
+    if step.sampling_sd_m == 0 or belief.status is Status.TRACKING:
+        return step
+    return replace(step, sampling_sd_m=0.0)

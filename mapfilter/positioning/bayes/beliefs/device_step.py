@@ -72,7 +72,8 @@ class DeviceStep:
     def placed(self, cloud: Cloud) -> Cloud:
         """Return hypotheses on the device."""
         placed = self.device.placed
-        return cloud._replace(state=placed(cloud.state), kept=placed(array_of(cloud.kept)))
+        kept = np.ascontiguousarray(array_of(cloud.kept))
+        return cloud._replace(state=placed(cloud.state), kept=placed(kept))
 
     def move(
         self, state: Any, log_weight: Any, motion: MotionStep, key: np.uint64

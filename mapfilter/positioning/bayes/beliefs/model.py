@@ -91,9 +91,9 @@ class BayesModel(EvidenceModel):
             return self._along_ways(state, log_weight, motion, key)
         if not isfinite(motion.heading_rad):
             return self._to_all_sides(state, log_weight, motion, key)
-        call, moved = moving(
-            state, motion.step_m, motion.heading_rad, self.motion, key, motion.sampling_sd_m
-        )
+        sampling_sd_m, rows = motion.sampling_sd_m, motion.rows
+        heading_rad, errors = motion.heading_rad, self.motion
+        call, moved = moving(state, motion.step_m, heading_rad, errors, key, sampling_sd_m, rows)
         beyond, factors = self._beyond_per_m, self.weights.over(abs(motion.step_m))
         weighed: Floats
         if isinstance(self.area, TiledArea):

@@ -5,19 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import isfinite, nan
-from typing import Any
 
 import numpy as np
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.beliefs.belief_changes import (
+    assumed,
     carried_on,
     counted_from,
+    moved_as_read,
     remounted,
     turned_at_jump,
 )
 from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.beliefs.legs import NO_LEG, Leg, may_wait
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, MapBelief
 from mapfilter.positioning.bayes.rivals.half_turns import HalfTurns
@@ -44,8 +46,9 @@ def moved(
     watch: SensorWatch,
     epoch: Epoch,
     rng: np.random.Generator,
+    waits: Callable[[float], bool] | None = None,
 ) -> tuple[BayesState, list[UnusedReading]]:
-    """Move the beliefs by an epoch's dead reckoning.
+    """Move the beliefs by an epoch's dead reckoning, unless its steps wait for others.
 
     Parameters
     ----------
@@ -58,6 +61,9 @@ def moved(
     epoch : Epoch
         With a step to all sides for motion that was not measured.
     rng : numpy.random.Generator
+    waits : callable
+        Returns whether beliefs may wait, by the distance travelled after the motion. Without it
+        each row moves them by itself.
 
     Returns
     -------
@@ -68,12 +74,14 @@ def moved(
     rested = state.watch.rest if watch.rest is None else None
     if beliefs.may_be_anywhere(state, watch, epoch.time_s):
         state = state.begun_anew()
-    move = _Move.of(beliefs, state, epoch, rng)
+    move = _Move.of(beliefs, state, epoch, rng, gathers=waits is not None)
     move.begin_rivals()
     if rested is not None:
         move.carry_on(rested)
     for row in epoch.motion:
         move.by_row(row)
+    if waits is None or move.leg.is_whole or not waits(move.reckoning.travelled_m):
+        move.finish_leg()
     return move.after(watch), move.unused
 
 
@@ -86,6 +94,7 @@ class _Move:
     epoch: Epoch
     rng: np.random.Generator
     own: OwnDraws
+    gathers: bool
     ranged: bool
     positioned: bool
     by_course: bool
@@ -95,6 +104,7 @@ class _Move:
     held: tuple[HeldOtherwise, ...]
     half_turns: HalfTurns
     unaided: tuple[HeldOtherwise, ...]
+    leg: Leg
     reckoning: DeadReckoning
     path: RecentPath
     heading_rad: float
@@ -104,9 +114,15 @@ class _Move:
 
     @classmethod
     def of(
-        cls, beliefs: BeliefFilters, state: BayesState, epoch: Epoch, rng: np.random.Generator
+        cls,
+        beliefs: BeliefFilters,
+        state: BayesState,
+        epoch: Epoch,
+        rng: np.random.Generator,
+        *,
+        gathers: bool,
     ) -> _Move:
-        """Return the motion of an epoch before its first row."""
+        """Return the motion of an epoch before its first row; ``gathers`` is whether rows wait."""
         ranged = any(isfinite(one.pseudorange_m) for one in epoch.pseudoranges)
         stood_s = epoch.time_s - state.watch.pace.stepped_s
         return cls(
@@ -115,6 +131,7 @@ class _Move:
             epoch=epoch,
             rng=rng,
             own=OwnDraws(epoch.time_s),
+            gathers=gathers,
             ranged=ranged,
             positioned=epoch.gnss is not None or ranged,
             # Courses along ways count from a heading of 0, those of a compass from its headings.
@@ -125,6 +142,7 @@ class _Move:
             held=state.held,
             half_turns=state.half_turns,
             unaided=state.unaided,
+            leg=state.leg,
             reckoning=state.reckoning,
             path=state.path,
             heading_rad=state.heading_rad,
@@ -136,14 +154,16 @@ class _Move:
 
     def begin_rivals(self) -> None:
         """Begin beliefs beside the main one that this epoch's positions call for."""
-        belief, hold, gone_m = self.belief, self.state.hold, self.reckoning.travelled_m
+        hold, gone_m = self.state.hold, self.reckoning.travelled_m
         if self.ranged:
             # Pseudoranges are compared with the main belief alone, so there is no doubt of a jump.
             as_is = (one for one in self.held if one.hold.is_as_measured)
             self.held = () if hold.is_as_measured else tuple(as_is)
+        if self.positioned:
+            self.finish_leg()
+        beliefs, null, belief = self.beliefs, self.state.null, self.belief
         if not self.positioned or not isinstance(belief, ParticleBelief):
             return
-        beliefs, null = self.beliefs, self.state.null
         # Positions tell whether headings are still read rightly.
         plain = hold.is_as_measured or any(one.hold.is_as_measured for one in self.held)
         if not plain and self.state.status is belief.status is Status.TRACKING:
@@ -158,6 +178,7 @@ class _Move:
     def carry_on(self, rested: Rest) -> None:
         """Spread the belief over where one may have been carried during a rest that has ended."""
         if self.belief is not None and self.beliefs.may_have_left(self.state):
+            self.finish_leg()
             gone_s = self.epoch.time_s - rested.since_s
             self.belief = carried_on(self.belief, rested, gone_s, self.own.carrying)
 
@@ -205,28 +226,56 @@ class _Move:
             self.compass, belief = False, self.beliefs.without_compass(belief, self.rng)
             # What began beside it has headings of a compass.
             self.unaided = ()
-        predict = self.beliefs.moving_filter(self.state, compass=self.compass).predict
+            self.belief = belief
         if self.compass and not self.ranged and jumps(self.walking_rad, row, self.beliefs.holds):
-            belief = self._at_a_jump(belief, row.heading_rad)
+            self.finish_leg()
+            assert self.belief is not None, "steps wait for a belief"
+            self.belief = self._at_a_jump(self.belief, row.heading_rad)
+        before, self.reckoning = self.reckoning, self.reckoning.moved(step)
+        if self.gathers and isinstance(belief, ParticleBelief) and may_wait(measured):
+            self._join(measured, before)
+            return Reason.USED
+        self.finish_leg()
+        return self._take(measured)
+
+    def _join(self, measured: MotionStep, before: DeadReckoning) -> None:
+        """Let a step wait, with those that lead to the same side."""
+        joined = self.leg.joined(measured, before)
+        if joined is None:
+            self.finish_leg()
+            joined = self.leg.joined(measured, before)
+        assert joined is not None, "a leg begins with any step"
+        self.leg = joined
+
+    def finish_leg(self) -> None:
+        """Move the beliefs by what waits."""
+        leg, self.leg = self.leg, NO_LEG
+        if leg.rows:
+            self._take(leg.step)
+
+    def _take(self, measured: MotionStep) -> Reason:
+        """Move all beliefs by a step, each as it reads it."""
+        belief, step = self.belief, self.state.hold.read(measured)
+        assert belief is not None, "steps wait for a belief"
+        predict = self.beliefs.moving_filter(self.state, compass=self.compass).predict
         if self.held:
             own = self.own.moving
-            self.held = tuple(_moved_as_read(one, predict, measured, own) for one in self.held)
+            self.held = tuple(moved_as_read(one, predict, measured, own) for one in self.held)
         if self.unaided:
             own = self.own.unaided
-            beside = (_moved_as_read(one, predict, measured, own) for one in self.unaided)
+            beside = (moved_as_read(one, predict, measured, own) for one in self.unaided)
             self.unaided = tuple(beside)
-        belief, why = predict(belief, _assumed(step, belief), self.rng)
+        belief, why = predict(belief, assumed(step, belief), self.rng)
         motion = self.beliefs.model.motion
         self.belief = remounted(belief, motion, abs(step.step_m), self.rng)
-        self.reckoning = self.reckoning.moved(step)
         if self.alternative is not None:
             other = self.alternative.belief
             as_read = self.alternative.hold.read(measured)
-            other, _ = predict(other, _assumed(as_read, other), self.rng)
+            other, _ = predict(other, assumed(as_read, other), self.rng)
             self.alternative = replace(self.alternative, belief=other)
         if self.twin is not None:
             other = self.twin.belief
-            other, _ = predict(other, _assumed(mirrored_step(step), other), self.rng)
+            other, _ = predict(other, assumed(mirrored_step(step), other), self.rng)
             self.twin = replace(self.twin, belief=other)
         return why
 
@@ -277,22 +326,5 @@ class _Move:
             held=self.held,
             half_turns=self.half_turns,
             unaided=self.unaided,
+            leg=self.leg,
         )
-
-
-def _moved_as_read(
-    one: HeldOtherwise, predict: Callable[..., Any], measured: MotionStep, rng: np.random.Generator
-) -> HeldOtherwise:
-    """Return a belief beside the main one, moved by a step as it reads it."""
-    as_read = one.hold.read(measured)
-    return replace(one, belief=predict(one.belief, _assumed(as_read, one.belief), rng)[0])
-
-
-def _assumed(step: MotionStep, belief: MapBelief) -> MotionStep:
-    """Return a step with the errors that a belief assumes: that of its sampling once it is tracked.
-
-    With it a belief that still searches would be too wide to be in one place for some way.
-    """
-    if step.sampling_sd_m == 0 or belief.status is Status.TRACKING:
-        return step
-    return replace(step, sampling_sd_m=0.0)

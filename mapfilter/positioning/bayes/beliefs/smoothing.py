@@ -29,7 +29,7 @@ from mapfilter.models.street_motion import (
 )
 from mapfilter.positioning.bayes.area.area_frame import AreaFrame
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, MapBelief
-from mapfilter.positioning.bayes.state import BayesState
+from mapfilter.positioning.bayes.state import BayesState, belief_here
 from mapfilter.positioning.estimate import TrackEstimate
 
 _MAX_BYTES = 400 * 2**20
@@ -112,7 +112,8 @@ class BayesSmoother:
                 self._keep_only(ours + (self.alternative if self.alternative_is_whole else []))
             self.alternative, self.alternative_is_whole = [], True
         due = not self.kept or now.travelled_m - self.kept[-1].travelled_m >= self.every_m
-        if after.belief is None or not due:
+        if after.belief is None or not due or after.leg.rows:
+            # Beliefs whose steps wait are kept when these have moved them.
             return
         self._append(self.kept, after.belief)
         if after.alternative is not None:
@@ -169,7 +170,7 @@ class BayesSmoother:
 
     def close(self) -> None:
         """Keep the last belief, from which paths go back."""
-        belief = self.last.belief if self.last is not None else None
+        belief = belief_here(self.last) if self.last is not None else None
         if belief is not None and self.kept and self.kept[-1].epoch < len(self.moved) - 1:
             self._append(self.kept, belief)
 

@@ -30,6 +30,7 @@ class Hold:
                 unit_m * step.spread_m,
                 unit_m * step.sampling_sd_m,
                 step.turned_sd_rad,
+                step.rows,
             )
         if self.is_as_measured or not isfinite(step.heading_rad):
             return step

@@ -12,7 +12,7 @@ from math import exp
 
 import numpy as np
 
-from mapfilter._threads import ONE, Call, Threads
+from mapfilter._threads import ONE, Threads
 from mapfilter._types import Bytes, Floats, Floats32, Ints32
 from mapfilter.filters.belief_models import Cloud
 from mapfilter.filters.contract import Reason
@@ -21,13 +21,10 @@ from mapfilter.filters.resampling import log_sum
 from mapfilter.models import fingerprint
 from mapfilter.models.ageing import Ageing, age, as_it_is
 from mapfilter.models.level_errors import LevelReport
-from mapfilter.models.level_kernels import (
-    Prediction,
-    gained,
-    weigh_by_absence,
-    weigh_by_levels,
-)
+from mapfilter.models.level_kernels import Prediction, gained
 from mapfilter.models.level_memory import LevelMemory
+from mapfilter.models.record_tiles import kept_in, new_records, records_of
+from mapfilter.models.report_kernel import NOT_HEARD, NOT_SERVED, Heard, Served, weigh_by_report
 from mapfilter.positioning.bayes.area.area_frame import AreaFrame
 from mapfilter.positioning.bayes.area.area_map import AreaMap
 from mapfilter.positioning.bayes.area.beyond_edge import beyond_edge
@@ -99,22 +96,23 @@ class EvidenceModel:
             beyond, used = np.flatnonzero(self.area.beyond(cloud.state)), True
             before = log_weight[beyond]
             memory, kept, pixel = self._found(cloud, reading)
-            other, calls = 0.0, list[Call]()
+            other, served = 0.0, NOT_SERVED
             if reading.serving >= 0 and reading.serving_weight > 0:
-                kept, calls = self._serving(memory, kept, pixel, log_weight, reading)
+                if self.serving_is_measured:
+                    log_weight += self.log_serving_at(pixel, reading)
+                else:
+                    served = self._serving(memory, pixel, reading)
             if reading.levels is not None:
-                start = log_weight
-                if withholds:
-                    self.threads.over(log_weight.size, *calls)
-                    start, calls = log_weight.copy(), []
-                memory = self._weigh_levels(memory, kept, calls, pixel, log_weight, reading)
+                start = np.empty(log_weight.size if withholds else 0)
+                memory = self._weigh_levels(memory, kept, served, pixel, log_weight, start, reading)
                 other = memory.other_log_likelihood
                 if withholds:
                     withheld_share = 1 - self.evidence.levels.tracking_share
                     kept_back = gained(start, log_weight, withheld_share)
             else:
-                self.threads.over(log_weight.size, *calls, (age, kept))
-            cloud = Cloud(cloud.state, kept.now, memory)
+                self._age(kept, served, log_weight)
+            now = kept_in(kept.now, memory.width)
+            cloud = Cloud(cloud.state, now, memory)
             for bound in reading.bounds:
                 predicted, own, cells = self._looked_up(pixel, bound.cells, rough=False)
                 fingerprint.weigh_by_bound(
@@ -129,7 +127,7 @@ class EvidenceModel:
                 counted = log_weight - kept_back
             if beyond.size:
                 unknown = reading.radio_under_null(other)
-                odds = memory.beyond_odds(kept.now)[beyond]
+                odds = memory.beyond_odds(now, beyond)
                 if counted is not None:
                     share = self.evidence.levels.tracking_share
                     counted_unknown = reading.radio_under_null(share * other)
@@ -138,7 +136,7 @@ class EvidenceModel:
                 held = gained(before, log_weight[beyond], 1.0)
                 at_edge = beyond_edge(odds, held, unknown)
                 log_weight[beyond] = before + at_edge.gained
-                memory.keep_beyond_odds(kept.now, beyond, at_edge.log_odds)
+                memory.keep_beyond_odds(now, beyond, at_edge.log_odds)
         for term in reading.terms:
             log_likelihood = term.log_likelihood(cloud.state)
             log_weight += log_likelihood
@@ -182,61 +180,64 @@ class EvidenceModel:
     def _found(self, cloud: Cloud, reading: RadioReading) -> tuple[LevelMemory, Ageing, Ints32]:
         """Return what a reading finds: the memory, what hypotheses keep, and their pixels.
 
-        Of what they keep all rows are to be aged yet, but for a serving cell that is new.
+        What they keep is to be aged yet, but for a serving cell that is new.
         """
         errors, memory, length_m = self.evidence.levels, cloud.shared, reading.length_m
         # That takes less time than to divide it.
         pixel, count = fingerprint.pixels(cloud.state, self.area.frame), cloud.state.shape[1]
         if memory is None or not self.remember:
             memory = LevelMemory.empty(errors, self.area.site_of)
-            kept = as_it_is(memory.start(count))
+            kept = as_it_is(records_of(memory.start(count)))
         else:
             memory, decay = memory.after(length_m)
-            keep, due = exp(-length_m / errors.fault_m), np.ones(memory.width, dtype=np.bool_)
+            of, chosen = columns_of(cloud.kept)
+            keep, before = exp(-length_m / errors.fault_m), records_of(of)
             # NumPy asks for large pages, numba for many small ones.
-            now = np.empty((memory.width, count), dtype=np.float32)
-            kept = Ageing(*columns_of(cloud.kept), decay, keep, errors.fault_log_odds, due, now)
-        served = [reading.serving] if reading.serving >= 0 else []
-        memory, kept, _ = self._with_cells(memory, kept, [], np.array(served, dtype=np.int32))
+            now = new_records(count, memory.width)
+            kept = Ageing(before, chosen, decay, keep, errors.fault_log_odds, True, now)
+        serving = [reading.serving] if reading.serving >= 0 else []
+        bands = np.array(serving, dtype=np.int32)
+        memory, kept, _ = self._with_cells(memory, kept, NOT_SERVED, np.empty(0), bands)
         return memory, kept, pixel
 
     def _with_cells(
-        self, memory: LevelMemory, kept: Ageing, calls: list[Call], bands: Ints32
-    ) -> tuple[LevelMemory, Ageing, list[Call]]:
+        self, memory: LevelMemory, kept: Ageing, served: Served, log_weight: Floats, bands: Ints32
+    ) -> tuple[LevelMemory, Ageing, Served]:
         """Give cells slots; where some are new, what hypotheses keep is aged before.
 
-        ``calls`` are due before that, and are returned if they still are.
+        So is the serving cell weighed, which is returned if it still is due.
         """
         if memory.has_slots(bands):
-            return memory, kept, calls
-        self.threads.over(kept.now.shape[1], *calls, (age, kept))
-        memory, now = memory.with_cells(bands, kept.now, in_place=True)
-        return memory, as_it_is(now), []
+            return memory, kept, served
+        self._age(kept, served, log_weight)
+        kept_now = kept_in(kept.now, memory.width)
+        memory, _ = memory.with_cells(bands, kept_now, in_place=True)
+        return memory, as_it_is(kept.now), NOT_SERVED
 
-    def _serving(
-        self,
-        memory: LevelMemory,
-        kept: Ageing,
-        pixel: Ints32,
-        log_weight: Floats,
-        reading: RadioReading,
-    ) -> tuple[Ageing, list[Call]]:
-        """Return the calls that add the log-likelihood of the serving cell, in place.
+    def _age(self, kept: Ageing, served: Served, log_weight: Floats) -> None:
+        """Age what hypotheses keep, and weigh by a serving cell, in place."""
+        count = kept.now.shape[0]
+        if served.row < 0:
+            self.threads.over(count, (age, kept))
+            return
+        given = kept, served, NOT_HEARD, NOT_HEARD, self._bound_table, 0.0
+        self.threads.over(count, (weigh_by_report, *given, log_weight, np.empty(0)))
 
-        Also return what is to be aged besides.
-        """
-        table, weight = self._serving_table, reading.serving_weight
-        row = memory.fault_row(reading.serving)
-        other = -self.evidence.serving.fault_nats
+    def _serving(self, memory: LevelMemory, pixel: Ints32, reading: RadioReading) -> Served:
+        """Return the serving cell as kernels take it."""
         # Its own level, the strongest and the second strongest of its layer.
         top = self.area.strongest(reading.serving)
         some = np.array([reading.serving, top, top + 1], dtype=np.int32)
         predicted, pixel, some = self._looked_up(pixel, some, rough=False)
-        cells = fingerprint.ServingBands(predicted.bands, *some.tolist())
-        flat, odds = predicted.level_dbm, kept.now[row]
-        given = pixel, flat, cells, table, weight, odds, other, log_weight
-        calls = [(age, kept.of_row(row)), (fingerprint.weigh_by_serving, *given)]
-        return kept.without_row(row), calls
+        return Served(
+            pixel,
+            predicted.level_dbm,
+            fingerprint.ServingBands(predicted.bands, *some.tolist()),
+            self._serving_table,
+            reading.serving_weight,
+            memory.fault_row(reading.serving),
+            -self.evidence.serving.fault_nats,
+        )
 
     @property
     def serving_is_measured(self) -> bool:
@@ -258,14 +259,16 @@ class EvidenceModel:
         self,
         memory: LevelMemory,
         kept: Ageing,
-        calls: list[Call],
+        served: Served,
         pixel: Ints32,
         log_weight: Floats,
+        start: Floats,
         reading: RadioReading,
     ) -> LevelMemory:
         """Add the log-likelihood of levels and absent cells, in place; return the memory now.
 
-        ``calls`` are due before.
+        That of the serving cell is added before, and ``start`` filled with weights after it, if it
+        is not empty.
         """
         report = reading.levels
         assert report is not None
@@ -273,7 +276,8 @@ class EvidenceModel:
         # Cells that nobody expects say nothing, neither for the belief nor against it.
         report = self._expected_absent(pixel, report)
         cells = np.concatenate([report.cell, report.absent])
-        memory, kept, calls = self._with_cells(memory, kept, calls, cells[: memory.slots])
+        bands = cells[: memory.slots]
+        memory, kept, served = self._with_cells(memory, kept, served, log_weight, bands)
         if report.cell.size > memory.slots:
             slotted = np.isin(report.cell, memory.band)
             report = report._replace(cell=report.cell[slotted], level_dbm=report.level_dbm[slotted])
@@ -281,14 +285,12 @@ class EvidenceModel:
         rough_db2 = mean_rough_db2(predicted, own, cells)
         memory, terms = memory.updated(report, rough_db2)
         absent = memory.absence(report)
-        by_levels = predicted, terms._replace(cell=cells), weight, log_weight
-        calls = [*calls, (weigh_by_levels, kept, own, *by_levels)]
+        levels, missing = Heard(own, predicted, terms._replace(cell=cells)), NOT_HEARD
         if absent.cell.size:
             predicted, own, cells = self._looked_up(pixel, absent.cell)
-            terms_of = absent._replace(cell=cells), self._bound_table
-            given = own, predicted, *terms_of, weight, log_weight
-            calls.append((weigh_by_absence, kept.now, *given))
-        self.threads.over(log_weight.size, *calls)
+            missing = Heard(own, predicted, absent._replace(cell=cells))
+        given = kept, served, levels, missing, self._bound_table, weight, log_weight, start
+        self.threads.over(log_weight.size, (weigh_by_report, *given))
         return memory.with_other(weight * (float(terms.other.sum()) + float(absent.other.sum())))
 
     def _expected_absent(self, pixel: Ints32, report: LevelReport) -> LevelReport:

@@ -12,10 +12,7 @@ from math import isfinite, log
 
 import numpy as np
 
-from mapfilter._threads import Call
 from mapfilter._types import Bytes, Floats, Floats32, Ints32
-from mapfilter.models.ageing import Ageing
-from mapfilter.models.level_memory import LevelMemory
 from mapfilter.models.measured_map import ServingStatistics
 from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.sources.evidence import RadioReading
@@ -83,19 +80,6 @@ class MeasuredMapModel(BayesModel):
         more_db = np.sqrt(np.maximum(sd_db**2 - self.evidence.levels.total_db**2, 0.0))
         tenths: Bytes = np.minimum(np.rint(10 * more_db), 255).astype(np.uint8).reshape(-1)
         return tenths
-
-    def _serving(
-        self,
-        memory: LevelMemory,
-        kept: Ageing,
-        pixel: Ints32,
-        log_weight: Floats,
-        reading: RadioReading,
-    ) -> tuple[Ageing, list[Call]]:
-        if self.serving_is_measured:
-            log_weight += self.log_serving_at(pixel, reading)
-            return kept, []
-        return super()._serving(memory, kept, pixel, log_weight, reading)
 
     @property
     def serving_is_measured(self) -> bool:

@@ -1,0 +1,211 @@
+"""Steps that wait for others: beliefs go by legs, and positions by dead reckoning in between."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from made_town import Town, walk_log
+
+from mapfilter.filters.contract import MotionStep, Status
+from mapfilter.filters.particle import ParticleBelief
+from mapfilter.models.street_motion import BIAS, LOG_SCALE, STATES, MotionErrors, moving
+from mapfilter.models.street_motion import noise_of_step as noise
+from mapfilter.positioning.bayes.beliefs.legs import LEG_M, NO_LEG, Lead, may_wait
+from mapfilter.positioning.bayes.beliefs.path import DeadReckoning
+from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
+from mapfilter.positioning.merging import epochs
+from mapfilter.positioning.sensors.rest import Rest
+from mapfilter.serving.state_file import decode, encode
+
+TOWN = Town.of(1)
+START_M = 500_300.0, 4_500_300.0
+STEP = MotionStep(1.4, 0.3)
+
+
+@cache
+def positioner():
+    few = {"max_particles": 400, "min_search_particles": 400, "min_particles": 200}
+    return BayesFilter(heading_sd_deg=6.0, **few).over_area(TOWN.area())
+
+
+def begun(**more):
+    rng = np.random.default_rng(3)
+    return replace(positioner().begin_at(*START_M, 3.0, rng), **more), rng
+
+
+def walked(state, rng, *motion, since_s=0):
+    """States and outputs after epochs of one row each."""
+    found = []
+    for time_s, step in enumerate(motion, since_s + 1):
+        state, output = positioner().step(state, Epoch(float(time_s), (step,)), rng)
+        found.append((state, output))
+    return found
+
+
+def leg_of(*steps):
+    leg, reckoning = NO_LEG, DeadReckoning()
+    for step in steps:
+        leg = leg.joined(step, reckoning)
+        reckoning = reckoning.moved(step)
+    return leg
+
+
+def test_a_leg_has_the_noise_of_its_steps():
+    errors = MotionErrors()
+    for rows, step_m in ((4, 1.4), (4, 2.5), (5, 0.7)):
+        _, _, one = noise(step_m, errors, 0.0)
+        _, _, leg = noise(rows * step_m, errors, 0.0, rows)
+        for name in ("along_m", "across_m", "bias_rad"):
+            expected = rows**0.5 * getattr(one, name)
+            assert getattr(leg, name) == pytest.approx(expected), name
+
+
+def test_a_leg_leads_where_its_steps_do():
+    """Positions and their spread after four steps, by each and by their sum."""
+    errors, count = MotionErrors(), 40_000
+    state = np.zeros((STATES, count), dtype=np.float32)
+    rng = np.random.default_rng(2)
+    state[BIAS], state[LOG_SCALE] = rng.normal(0.3, 0.1, count), rng.normal(0.0, 0.05, count)
+    steps = [MotionStep(1.4, heading) for heading in (0.2, 0.5, 0.4, 0.1)]
+    each = state
+    for key, step in enumerate(steps):
+        (kernel, *given), moved = moving(
+            each, step.step_m, step.heading_rad, errors, np.uint64(key)
+        )
+        kernel(0, count, *given)
+        each = moved
+    step = leg_of(*steps).step
+    (kernel, *given), whole = moving(
+        state, step.step_m, step.heading_rad, errors, np.uint64(9), 0.0, step.rows
+    )
+    kernel(0, count, *given)
+    np.testing.assert_allclose(whole[:2].mean(axis=1), each[:2].mean(axis=1), atol=0.05)
+    np.testing.assert_allclose(np.cov(whole[:2]), np.cov(each[:2]), rtol=0.1, atol=0.02)
+
+
+def test_a_leg_of_one_row_is_that_row():
+    step = MotionStep(5.0, 0.5, 0.1, sampling_sd_m=0.25)
+    assert leg_of(step).step is step
+
+
+@pytest.mark.parametrize(
+    ("steps", "whole"),
+    [((5.0,), True), ((1.4,) * 4, False), ((1.4,) * 5, True), ((4.0,), False), ((), False)],
+)
+def test_a_leg_is_whole_once_another_such_step_would_be_too_much(steps, whole):
+    assert leg_of(*(MotionStep(length_m, 0.5) for length_m in steps)).is_whole is whole
+
+
+def test_a_leg_ends_at_a_corner_and_before_it_is_too_long():
+    leg = leg_of(*[MotionStep(2.0, 0.0)] * 3)
+    assert leg.joined(MotionStep(1.0, 0.7), DeadReckoning()).rows == 4
+    assert leg.joined(MotionStep(1.0, 0.9), DeadReckoning()) is None
+    assert leg.joined(MotionStep(LEG_M - 5.9, 0.0), DeadReckoning()) is None
+    assert leg.joined(MotionStep(0.0, 3.0), DeadReckoning()) is leg
+
+
+@pytest.mark.parametrize(
+    "step",
+    [
+        MotionStep(-1.0, 0.0), MotionStep(1.0, np.nan), MotionStep(np.nan, 0.0),
+        MotionStep(1.0, 0.0, turned_sd_rad=0.1), MotionStep(1.0, 0.0, spread_m=1.0),
+    ],
+)  # fmt: skip
+def test_other_steps_do_not_wait(step):
+    assert not may_wait(step)
+
+
+def test_a_belief_stays_and_its_position_goes_on_until_the_leg_is_whole():
+    state, rng = begun()
+    found = walked(state, rng, *[STEP] * 5)
+    assert [after.belief is state.belief for after, _ in found] == [True] * 4 + [False]
+    assert [after.leg.rows for after, _ in found] == [1, 2, 3, 4, 0]
+    east_m = np.array([output.fix.east_m for _, output in found])
+    # What the belief's errors make of a step, in the mean.
+    np.testing.assert_allclose(np.diff(east_m), 1.4 * np.cos(0.3), atol=0.15)
+    after, output = found[3]
+    fix = output.fix
+    here = positioner().hypotheses(after)
+    for places, found_m in ((here.east_m, fix.east_m), (here.north_m, fix.north_m)):
+        assert here.weight @ (places - found_m) == pytest.approx(0.0, abs=0.01)
+    first = found[0][1].fix
+    assert (output.fix.hypotheses, output.fix.way_id) == (first.hypotheses, first.way_id)
+    assert after.reckoning.travelled_m == pytest.approx(4 * 1.4)
+
+
+def test_all_beliefs_have_been_moved_when_something_is_read_of_them():
+    radio = (ReportRow("serving", "a", None, None, -70.0, 0),)
+    fix = GnssFix(START_M[0] + 4.0, START_M[1], 25.0, 25.0, 0.0)
+    for read in ({"radio": radio}, {"gnss": fix}):
+        state, rng = begun()
+        before, _ = walked(state, rng, STEP, STEP)[-1]
+        assert before.leg.rows == 2
+        after, _ = positioner().step(before, Epoch(3.0, (STEP,), **read), rng)
+        assert after.leg == NO_LEG
+        gone_m = after.belief.summary.mean[0] - before.belief.summary.mean[0]
+        assert gone_m == pytest.approx(3 * 1.4 * np.cos(0.3), abs=1.0)
+
+
+@pytest.mark.parametrize("status", [Status.CONVERGED, Status.UNCERTAIN])
+def test_what_lasts_for_one_epoch_does_not_wait(status):
+    state, rng = begun(status=status)
+    ((after, _),) = walked(state, rng, STEP)
+    assert (after.leg, after.belief is state.belief) == (NO_LEG, False)
+
+
+def test_a_doubtful_rest_does_not_wait():
+    state, rng = begun()
+    for rest, waits in ((Rest(0.0, pace_mps=1.4), True), (None, True)):
+        watched = replace(state, watch=state.watch._replace(rest=rest))
+        ((after, _),) = walked(watched, rng, MotionStep(0.0, 0.3))
+        assert (after.belief is state.belief) is waits
+
+
+def test_a_search_waits_too_and_loses_nothing_of_the_way():
+    log, rng = walk_log(TOWN, 1), np.random.default_rng(5)
+    state, waited, gone_m = positioner().begin(), 0, 0.0
+    for epoch in epochs(log)[:60]:
+        # Four steps where the log has one.
+        for part in range(4):
+            motion = tuple(replace(one, step_m=one.step_m / 4) for one in epoch.motion)
+            radio = epoch.radio if part == 3 else ()
+            time_s = epoch.time_s - 0.2 * (3 - part)
+            given = replace(epoch, time_s=max(time_s, 0.0), motion=motion, radio=radio)
+            begun_m = 0.0 if state.belief is None else state.reckoning.travelled_m
+            state, _ = positioner().step(state, given, rng)
+            waited += state.leg.rows > 0
+            if state.belief is not None and begun_m < state.reckoning.travelled_m:
+                gone_m += state.reckoning.travelled_m - begun_m
+    assert waited > 60
+    assert isinstance(state.belief, ParticleBelief)
+    assert state.reckoning.travelled_m == pytest.approx(gone_m)
+    way_m = state.belief.travelled_m + state.leg.way_m
+    assert way_m == pytest.approx(state.reckoning.travelled_m, rel=0.01)
+
+
+def test_a_session_is_saved_between_two_steps_of_a_leg():
+    state, rng = begun()
+    state, _ = walked(state, rng, STEP, STEP)[-1]
+    again = decode(encode({"state": state}), "session")["state"]
+    assert again.leg == state.leg != NO_LEG
+    assert again.reported.lead == state.reported.lead != None  # noqa: E711
+    other = np.random.default_rng()
+    other.bit_generator.state = rng.bit_generator.state
+    for given, draws in ((state, rng), (again, other)):
+        after, output = walked(given, draws, *[STEP] * 4, since_s=2)[-1]
+        if given is state:
+            expected = after.belief.state, output.fix
+    np.testing.assert_array_equal(after.belief.state, expected[0])
+    assert output.fix == expected[1]
+
+
+def test_a_lead_is_that_of_hypotheses_near_the_place():
+    state = np.zeros((STATES, 3), dtype=np.float32)
+    state[0], state[BIAS], state[LOG_SCALE] = [0.0, 10.0, 80.0], np.pi / 2, np.log(1.1)
+    state[BIAS, 2] = 0.0
+    lead = Lead.of(state, np.full(3, 1 / 3, dtype=np.float32), np.zeros(STATES))
+    assert lead == pytest.approx((0.0, 1.1), abs=1e-6)
+    assert lead.led_m((2.0, 1.0)) == pytest.approx((-1.1, 2.2), abs=1e-5)
+    assert Lead.of(state, np.zeros(3, dtype=np.float32), np.zeros(STATES)) == (1.0, 0.0)
