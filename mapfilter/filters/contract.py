@@ -100,8 +100,9 @@ class MotionStep(EqualByValue):
     turned_sd_rad : float
         Deviation of a change of heading that was not measured, of a step to all sides; headings
         that turns add up to are unknown by it from there on.
-    rows : int
-        How many measured steps it is the sum of, each with errors of its own.
+    rows : float
+        How many measured steps it is the sum of, each with errors of its own; of steps that are
+        not equally long, how many such would have the same noise.
     """
 
     step_m: float
@@ -110,7 +111,7 @@ class MotionStep(EqualByValue):
     spread_m: float = float("nan")
     sampling_sd_m: float = 0.0
     turned_sd_rad: float = 0.0
-    rows: int = 1
+    rows: float = 1.0
 
     @property
     def is_undirected(self) -> bool:

@@ -146,7 +146,7 @@ def moving(
     errors: MotionErrors,
     key: np.uint64,
     sampling_sd_m: float = 0.0,
-    rows: int = 1,
+    rows: float = 1.0,
 ) -> tuple[Call, Floats32]:
     """Return the call that does what :func:`move` does, and the array that it fills.
 
@@ -158,7 +158,7 @@ def moving(
 
 
 def noise_of_step(
-    step_m: float, errors: MotionErrors, sampling_sd_m: float, rows: int = 1
+    step_m: float, errors: MotionErrors, sampling_sd_m: float, rows: float = 1.0
 ) -> tuple[float, float, StepNoise]:
     """Return the mean step (m), the length travelled (m), and the noise of a step of some rows."""
     length = abs(step_m)

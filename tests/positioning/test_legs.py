@@ -85,6 +85,14 @@ def test_a_leg_leads_where_its_steps_do():
     np.testing.assert_allclose(np.cov(whole[:2]), np.cov(each[:2]), rtol=0.1, atol=0.02)
 
 
+def test_unequal_steps_have_the_noise_that_they_have_by_themselves():
+    errors, lengths_m = MotionErrors(), (1.5, 4.5, 2.0)
+    across_m2 = sum(noise(length_m, errors, 0.0)[2].across_m ** 2 for length_m in lengths_m)
+    step = leg_of(*(MotionStep(length_m, 0.0) for length_m in lengths_m)).step
+    _, _, leg = noise(step.step_m, errors, 0.0, step.rows)
+    assert leg.across_m**2 == pytest.approx(across_m2)
+
+
 def test_a_leg_of_one_row_is_that_row():
     step = MotionStep(5.0, 0.5, 0.1, sampling_sd_m=0.25)
     assert leg_of(step).step is step

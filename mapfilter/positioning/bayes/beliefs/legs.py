@@ -31,8 +31,8 @@ class Leg(NamedTuple):
     ----------
     rows : int
         Their number; 0 where none waits.
-    way_m : float
-        Sum of their lengths.
+    way_m, square_m2 : float
+        Sum of their lengths, and of the squares of these.
     east_m, north_m : float
         Their sum, as measured.
     sampling_m2 : float
@@ -45,6 +45,7 @@ class Leg(NamedTuple):
 
     rows: int = 0
     way_m: float = 0.0
+    square_m2: float = 0.0
     east_m: float = 0.0
     north_m: float = 0.0
     sampling_m2: float = 0.0
@@ -57,13 +58,19 @@ class Leg(NamedTuple):
         return self.rows > 0 and self.way_m * (1 + 1 / self.rows) > LEG_M
 
     @property
+    def equal_rows(self) -> float:
+        """Number of equal steps whose noise it has."""
+        return self.way_m**2 / self.square_m2
+
+    @property
     def step(self) -> MotionStep:
         """The leg as a step; of one row, that row as it was measured."""
         if self.rows == 1 and self.first is not None:
             return self.first
         length_m, heading_rad = hypot(self.east_m, self.north_m), atan2(self.north_m, self.east_m)
         sampling_sd_m = self.sampling_m2**0.5
-        return MotionStep(length_m, heading_rad, sampling_sd_m=sampling_sd_m, rows=self.rows)
+        rows = self.equal_rows
+        return MotionStep(length_m, heading_rad, sampling_sd_m=sampling_sd_m, rows=rows)
 
     def joined(self, step: MotionStep, reckoning: DeadReckoning) -> Leg | None:
         """Return the leg with a step behind it; None where that is too long, or turns aside.
@@ -90,7 +97,8 @@ class Leg(NamedTuple):
         east_m, north_m = length_m * cos(heading_rad), length_m * sin(heading_rad)
         sampling_m2 = step.sampling_sd_m**2
         if not self.rows:
-            return Leg(1, length_m, east_m, north_m, sampling_m2, reckoning, step)
+            square_m2 = length_m * length_m
+            return Leg(1, length_m, square_m2, east_m, north_m, sampling_m2, reckoning, step)
         if self.way_m + length_m > LEG_M:
             return None
         along_m2 = self.east_m * east_m + self.north_m * north_m
@@ -99,6 +107,7 @@ class Leg(NamedTuple):
         return Leg(
             self.rows + 1,
             self.way_m + length_m,
+            self.square_m2 + length_m * length_m,
             self.east_m + east_m,
             self.north_m + north_m,
             self.sampling_m2 + sampling_m2,
