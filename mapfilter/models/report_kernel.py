@@ -51,7 +51,8 @@ class Served(NamedTuple):
 class Heard(NamedTuple):
     """Levels of a report, or cells that are absent from it: none where there are no terms.
 
-    ``pixel`` (N,) are those of hypotheses in the prediction.
+    ``pixel`` (N,) are those of hypotheses in the prediction. Kernels are given its parts, as numba
+    takes five times as long to unpack a named tuple of named tuples.
     """
 
     pixel: Ints32
@@ -80,8 +81,12 @@ def weigh_by_report(
     stop: int,
     ageing: Ageing,
     served: Served,
-    levels: Heard,
-    absent: Heard,
+    pixel: Ints32,
+    predicted: Prediction,
+    terms: LevelTerms,
+    absent_pixel: Ints32,
+    absent_predicted: Prediction,
+    absent_terms: LevelTerms,
     table: Floats32,
     weight: float,
     log_weight: Floats,
@@ -89,7 +94,8 @@ def weigh_by_report(
 ) -> None:
     """Age what hypotheses keep, add the log-likelihood of a report to weights, and update both.
 
-    That is done for hypotheses ``begin`` to ``stop``. Levels and absent cells count by ``weight``.
+    That is done for hypotheses ``begin`` to ``stop``. Levels and absent cells, each the parts of a
+    :class:`Heard`, count by ``weight``.
 
     Parameters
     ----------
@@ -102,8 +108,8 @@ def weigh_by_report(
     """
     both, now, w = factors(ageing), ageing.now, _F(weight)
     rows, chosen = np.empty((now.shape[1], BLOCK), np.float32), ageing.chosen.size > 0
-    gain, upon = in_fours(levels.terms.gain), gain_of_sums(levels.terms)
-    absent_gain, absent_upon = in_fours(absent.terms.gain), gain_of_sums(absent.terms)
+    gain, upon = in_fours(terms.gain), gain_of_sums(terms)
+    absent_gain, absent_upon = in_fours(absent_terms.gain), gain_of_sums(absent_terms)
     steps = np.zeros((gain.shape[0], BLOCK), np.float32)
     absent_steps = np.zeros((absent_gain.shape[0], BLOCK), np.float32)
     one, other = np.empty(BLOCK, np.float32), np.empty(BLOCK, np.float32)
@@ -134,14 +140,14 @@ def weigh_by_report(
         if after_serving.size > 0:
             for j in range(count):
                 after_serving[first + j] = into[j]
-        if levels.terms.cell.size > 0:
+        if terms.cell.size > 0:
             add_levels(
-                rows, count, levels.pixel[first:], levels.predicted, levels.terms, gain, upon,
+                rows, count, pixel[first:], predicted, terms, gain, upon,
                 steps, one, other, total, w, into, ageing.before, ahead,
             )  # fmt: skip
-        if absent.terms.cell.size > 0:
+        if absent_terms.cell.size > 0:
             add_absence(
-                rows, count, absent.pixel[first:], absent.predicted, absent.terms, absent_gain,
+                rows, count, absent_pixel[first:], absent_predicted, absent_terms, absent_gain,
                 absent_upon, table, absent_steps, one, other, total, place, w, into,
             )  # fmt: skip
         _write(rows, count, now, first, large)

@@ -117,7 +117,7 @@ def report_of_aged_copies(p):
     bands, table = ServingBands(BANDS, 1, BANDS - 2, BANDS - 1), serving_table(ServingWeights())
     served = Served(p.pixel, p.level_dbm, bands, table, 0.3, 2 * SLOTS + 2, -0.7)
     heard, after_serving = Heard(p.pixel, predicted, p.terms), np.full(p.count, np.nan)
-    given_ = found, served, heard, heard, bound_table(), 0.35, p.log_weight, after_serving
+    given_ = found, served, *heard, *heard, bound_table(), 0.35, p.log_weight, after_serving
     return weigh_by_report, [*given_], [kept_in(found.now, WIDTH), p.log_weight, after_serving]
 
 

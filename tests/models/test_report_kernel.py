@@ -34,13 +34,13 @@ ROW, LARGE = 2 * SLOTS + 2, 66_000
 
 def by_parts_of_the_report(p):
     """Age, then weigh by the serving cell, by levels and by absent cells, each in its own pass."""
-    _, (found, served, heard, *_), _ = report_of_aged_copies(p)
+    _, (found, served, *heard), _ = report_of_aged_copies(p)
     age(0, p.count, found)
     kept, odds = kept_in(found.now, WIDTH), kept_in(found.now, WIDTH)[ROW].copy()
     given = served.pixel, served.level_dbm, served.cells, served.table, served.weight
     weigh_by_serving(0, p.count, *given, odds, served.other, p.log_weight)
     kept[ROW], after_serving = odds, p.log_weight.copy()
-    given = heard.pixel, heard.predicted, heard.terms
+    given = heard[:3]
     weigh_by_levels(0, p.count, as_it_is(found.now), *given, 0.35, p.log_weight)
     weigh_by_absence(0, p.count, found.now, *given, bound_table(), 0.35, p.log_weight)
     return kept, p.log_weight, after_serving

@@ -220,7 +220,7 @@ class EvidenceModel:
         if served.row < 0:
             self.threads.over(count, (age, kept))
             return
-        given = kept, served, NOT_HEARD, NOT_HEARD, self._bound_table, 0.0
+        given = kept, served, *NOT_HEARD, *NOT_HEARD, self._bound_table, 0.0
         self.threads.over(count, (weigh_by_report, *given, log_weight, np.empty(0)))
 
     def _serving(self, memory: LevelMemory, pixel: Ints32, reading: RadioReading) -> Served:
@@ -289,7 +289,7 @@ class EvidenceModel:
         if absent.cell.size:
             predicted, own, cells = self._looked_up(pixel, absent.cell)
             missing = Heard(own, predicted, absent._replace(cell=cells))
-        given = kept, served, levels, missing, self._bound_table, weight, log_weight, start
+        given = kept, served, *levels, *missing, self._bound_table, weight, log_weight, start
         self.threads.over(log_weight.size, (weigh_by_report, *given))
         return memory.with_other(weight * (float(terms.other.sum()) + float(absent.other.sum())))
 
