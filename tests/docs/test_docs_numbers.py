@@ -131,7 +131,8 @@ FAULTS = (
     f"is {number(-PULLS.search_threshold)} behind",
     f"odds of 1 to {number(1 / PULLS.probability)} for such positions",
     f"after {number(GNSS.trial_m)} m of that they are used again",
-    f"count as one over {number(GNSS.fix_memory_m)} m of way",
+    f"count as one over {number(GNSS.fix_memory_m)} m of way; those of a vehicle over "
+    f"{number(assembly._VEHICLE_FIX_MEMORY_S)} s, too",
     f"over {number(gnss_state._MEMORY_M)} m of way, by the squared distances",
     f"From {gnss_state._SHOWN:g} times on their variances count",
     f"{number(wander._APART_S)} s apart or more, eight of them",

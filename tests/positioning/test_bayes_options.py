@@ -52,6 +52,12 @@ def test_what_options_make_is_a_filter_over_the_area():
         assert (found.area, found.beliefs.grid) == (area, grid)
 
 
+def test_only_errors_of_fixes_of_vehicles_last_for_some_time():
+    walker, vehicle = (BayesFilter(vehicle=one).over_area(make_area()) for one in (False, True))
+    assert walker.satellites.fix_memory_s == 0.0
+    assert vehicle.satellites == replace(walker.satellites, fix_memory_s=14.0)
+
+
 def test_the_usual_motion_of_vehicles():
     model = BayesFilter(vehicle=True).over_area(Town.of(1).area()).model
     motion = model.motion

@@ -24,8 +24,9 @@ EAST_M, NORTH_M = (float(one) for one in project(CRS, 9.3, 48.5))
 ORIGIN_M = EAST_M - 500.0, NORTH_M - 400.0
 AREA_M2 = 1e6
 OPTIONS = GnssOptions(
-    fix_memory_m=20.0, gate=8.0, search_gate=16.0, probation_s=5.0, outliers=0.1, height_m=300.0
-)
+    fix_memory_m=20.0, fix_memory_s=14.0, gate=8.0, search_gate=16.0, probation_s=5.0,
+    outliers=0.1, height_m=300.0,
+)  # fmt: skip
 GATE = GnssGate(OPTIONS, CRS, ORIGIN_M, AREA_M2)
 PLACE_M = 500.0, 400.0
 """The true place in the frame of the hypotheses."""
@@ -79,6 +80,22 @@ def test_a_fix_that_agrees_weighs_hypotheses_and_leaves_the_belief(gone_m, times
     assert after.was_used(10.0)
     assert not after.was_used(11.0)
     assert found.belief is belief
+
+
+@pytest.mark.parametrize(
+    ("gone_m", "elapsed_s", "times"),
+    [(90.0, 28.0, 1.0), (90.0, 14.0, 1.0), (90.0, 7.0, 2.0), (10.0, 1.0, 14.0), (2.0, 7.0, 10.0)],
+)
+def test_fixes_of_a_fast_vehicle_count_as_one_over_some_time(gone_m, elapsed_s, times):
+    """At 10 m/s the way of 20 m is over after two fixes, whose errors last for longer."""
+    belief, fix = belief_at(sd_m=4.0), fix_at(4.0, -3.0)
+    state = GnssState(fix_used_at_m=100.0 - gone_m, fix_used_at_s=10.0 - elapsed_s)
+    assert state.repeats(OPTIONS, 10.0, 100.0) == pytest.approx(times)
+    found = compared(belief, state, gnss=fix)
+    own = FixTerm(widened(fix, times), ORIGIN_M).log_likelihood(belief.state)
+    total = np.log(np.exp(belief.log_weight) @ np.exp(own))
+    np.testing.assert_allclose(sum_of(found.terms, belief), own - total, atol=1e-6)
+    assert found.state.fix_used_at_s == 10.0
 
 
 def test_a_repeated_fix_makes_a_wide_belief_as_precise_as_it_is():

@@ -23,8 +23,9 @@ def test_the_usual_options_of_satellites_and_timing():
     assert asdict(GnssOptions()) == {
         "zenith_m": 2.0, "echo_m": 4.0, "echo_memory_m": 100.0, "echo_memory_s": 120.0,
         "reflection_m": 4.0, "reflection_times": 2.0, "lateness": 1.0, "fix_memory_m": 20.0,
-        "spacing_m": 10.0, "pause_s": 10.0, "mask_deg": 5.0, "height_m": 100.0,
-        "height_sd_m": 200.0, "slope": 0.3, "clock_sd_m": 3e5, "drift_sd_mps": 100.0,
+        "fix_memory_s": 0.0, "spacing_m": 10.0, "pause_s": 10.0, "mask_deg": 5.0,
+        "height_m": 100.0, "height_sd_m": 200.0, "slope": 0.3, "clock_sd_m": 3e5,
+        "drift_sd_mps": 100.0,
         "outliers": 0.05, "gate": 8.0, "search_gate": 16.0, "probation_s": 5.0, "trust": 3.0,
         "trust_grows_s": 120.0, "dispute_s": 10.0, "trial_m": 100.0,
         "agreed_trust": 12.0, "agreed_nats": 2.0,

@@ -36,6 +36,8 @@ _VEHICLE_MOTION: Mapping[str, float] = {
     "corners_per_m": 1 / 20,
 }
 _VEHICLE_LEAVES_PER_M = 3e-4
+_VEHICLE_FIX_MEMORY_S = 14.0
+"""Time in which a walker goes the distance for which errors of fixes last; cars have it too."""
 
 _MORE_BY_MAP = 3
 _LEAST_MASS_BY_MAP, _LEAST_HOLD_BY_MAP_M = 0.998, 200.0
@@ -79,6 +81,7 @@ def assembled(options: BayesFilter, area: AreaFrame) -> BayesPositioner:
             zenith_m=options.satellite_sd_m,
             height_m=options.antenna_height_m,
             height_sd_m=options.antenna_height_sd_m,
+            fix_memory_s=_VEHICLE_FIX_MEMORY_S if options.vehicle else 0.0,
         ),
         timing=TimingOptions(step_m=options.timing_step_m, advance_sd_m=options.timing_sd_m),
         smooth=options.smooth,

@@ -50,7 +50,6 @@ from mapfilter.positioning.gnss.sky import Sky, Unused, range_sigma_m, sky_over
 from mapfilter.positioning.gnss.state import GnssState
 
 _RESET_GATE = 0.5
-_MIN_MOVED_M = 0.1
 
 
 class GnssComparison(NamedTuple):
@@ -142,7 +141,10 @@ class GnssGate:
             found = found._replace(terms=(FixedTerm(np.zeros(1)),), under_null=0.0)
             if by_fix:
                 unused = replace(
-                    found.state, fix_used_at_m=state.fix_used_at_m, excess=state.excess
+                    found.state,
+                    fix_used_at_m=state.fix_used_at_m,
+                    fix_used_at_s=state.fix_used_at_s,
+                    excess=state.excess,
                 )
                 found = found.without("gnss", [""], Reason.ON_PROBATION, state=unused)
         return found
@@ -172,8 +174,7 @@ class GnssGate:
             if state.distrusted:
                 why = Reason.ON_PROBATION
                 return found.without("gnss", [""], why, state=state, compared=True)
-        gone_m = travelled_m - state.fix_used_at_m
-        times = max(options.fix_memory_m / max(gone_m, _MIN_MOVED_M), 1.0)
+        times = state.repeats(options, time_s, travelled_m)
         # A belief that has grown wider than a fix is no more precise by its error than the fix.
         times = min(times, repeated(belief, widened(fix, 1.0)))
         # What it adds is little where its error is that of the one before, and less where fixes are
@@ -189,7 +190,7 @@ class GnssGate:
             found = found._replace(rival_terms=(rival,), unexplained=True)
             return found.without("gnss", [""], why, state=state, compared=True)
         squared = squared_distance(belief, widened(fix, 1.0), self.origin_m) / 2
-        state = state.after_fix(squared if _is_found(belief) else 1.0, travelled_m)
+        state = state.after_fix(squared if _is_found(belief) else 1.0, time_s, travelled_m)
         # The likelihood of the whole belief is judged here, so it does not count in the CUSUM.
         terms = (*found.terms, term, FixedTerm(np.array([-total])))
         # Fixes in a row repeat the same error, and refute by the share that is new.

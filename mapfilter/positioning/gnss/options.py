@@ -31,8 +31,9 @@ class GnssOptions(Options):
         The same where it has: times the deviation, times its ratio to the least one of the epoch.
     lateness : float
         Mean of the errors by reflections over their deviation: reflections are late.
-    fix_memory_m : float
-        Distance for which errors of fixes last; fixes in a row count as one over it.
+    fix_memory_m, fix_memory_s : float
+        Distance and time for which errors of fixes last; fixes in a row count as one over it,
+        whichever takes longer; 0 s: by the distance alone.
     spacing_m, pause_s : float
         Satellites are used with each radio report that is used; without one after this distance,
         or after this time at a standstill.
@@ -72,6 +73,7 @@ class GnssOptions(Options):
     reflection_times: NotNegative = 2.0
     lateness: NotNegative = 1.0
     fix_memory_m: Positive = 20.0
+    fix_memory_s: NotNegative = 0.0
     spacing_m: NotNegative = 10.0
     pause_s: NotNegative = 10.0
     mask_deg: Annotated[float, Ge(0), Lt(90)] = 5.0

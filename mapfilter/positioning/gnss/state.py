@@ -12,6 +12,7 @@ from mapfilter.positioning.gnss.wander import FixWander
 
 _MEMORY_M, _MOST_OF_ONE = 100.0, 0.05
 """Way over which the precision of fixes is followed, and the largest share of one of them."""
+_MIN_MOVED_M, _MIN_ELAPSED_S = 0.1, 0.1
 _SHOWN, _MOST = 1.2, 9.0
 """Times that squared distances are larger than stated from which on variances are raised; those of
 a fix that is still usual, and the most by which variances are raised."""
@@ -25,8 +26,8 @@ class GnssState:
     ----------
     receiver : Receiver or None
         Clock and height; None before the first pseudorange.
-    fix_used_at_m : float
-        Distance travelled when a fix was last used.
+    fix_used_at_m, fix_used_at_s : float
+        Distance travelled and time when a fix was last used.
     compared_at_m, compared_at_s : float
         Distance travelled and time at the last comparison.
     probation_until_s : float
@@ -48,6 +49,7 @@ class GnssState:
 
     receiver: Receiver | None = None
     fix_used_at_m: float = -inf
+    fix_used_at_s: float = -inf
     compared_at_m: float = -inf
     compared_at_s: float = -inf
     probation_until_s: float = -inf
@@ -91,7 +93,18 @@ class GnssState:
         by_one = self.excess if self.excess >= _SHOWN else 1.0
         return max(by_one, self.wander.before.understated)
 
-    def after_fix(self, squared: float, travelled_m: float) -> GnssState:
+    def repeats(self, options: GnssOptions, time_s: float, travelled_m: float) -> float:
+        """Return how many fixes like one now have the error of one: 1 where it is all new.
+
+        The error lasts for some way, as that of reflections does, and for some time, as that of
+        satellites and of the receiver's own filter does: a car has soon left the house that
+        reflects, but not these.
+        """
+        gone_m = max(travelled_m - self.fix_used_at_m, _MIN_MOVED_M)
+        elapsed_s = max(time_s - self.fix_used_at_s, _MIN_ELAPSED_S)
+        return max(options.fix_memory_m / gone_m, options.fix_memory_s / elapsed_s, 1.0)
+
+    def after_fix(self, squared: float, time_s: float, travelled_m: float) -> GnssState:
         """Return the state after a fix that is used.
 
         Fixes that are off more often than their deviations say are less precise than they state
@@ -101,12 +114,18 @@ class GnssState:
         ----------
         squared : float
             Squared distance of the fix from the belief per component, in deviations of both.
-        travelled_m : float
-            Distance travelled by then.
+        time_s, travelled_m : float
+            Time and distance travelled by then.
         """
         new = min((travelled_m - self.fix_used_at_m) / _MEMORY_M, _MOST_OF_ONE)
         excess = self.excess + new * (min(squared, _MOST) - self.excess)
-        return replace(self, fix_used_at_m=travelled_m, rejected_since_s=nan, excess=excess)
+        return replace(
+            self,
+            fix_used_at_m=travelled_m,
+            fix_used_at_s=time_s,
+            rejected_since_s=nan,
+            excess=excess,
+        )
 
     @property
     def rejecting(self) -> bool:
