@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import mapfilter as mf
 from mapfilter.errors import InputError
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
@@ -265,3 +266,21 @@ def test_letters_of_the_other_axis_are_no_degrees(tmp_path):
     columns = {"time": TIME_S, "lat": [f"{one} E" for one in LAT], "lon": LON}
     with pytest.raises(InputError, match="lat: 40 values are no numbers"):
         read(tmp_path, columns)
+
+
+@pytest.mark.parametrize("date", ["2026-05-01", "01.05.2026", "20260501", "2026/05/01"])
+@pytest.mark.parametrize("names", ["date,hour,min,sec", "Date,Hour,Minute,Second", "date,hh,mm,ss"])
+def test_hours_minutes_and_seconds_follow_a_date(tmp_path, names, date):
+    """Each position was of midnight, as the date alone was taken for the time."""
+    rows = [f"{date},23,59,{second}.5,60.1{second:04d},24.9" for second in range(57, 60)]
+    rows += [f"{'02'.join(date.rsplit('01', 1))},0,0,0.5,60.10060,24.9"]
+    path = tmp_path / "drive.csv"
+    path.write_text("\n".join([f"{names},lat,lon", *rows]) + "\n")
+    log = mf.read_log(path, zone="+00:00")
+    assert log.gnss["time_s"].tolist() == [0.5, 1.5, 2.5, 3.5]
+
+
+def test_a_date_that_is_not_understood_is_told_beside_hours(tmp_path):
+    (tmp_path / "drive.csv").write_text("date,hour,min,sec,lat,lon\n01/05/2026,23,59,1,60.1,24.9\n")
+    with pytest.raises(InputError, match="day or month first"):
+        mf.read_log(tmp_path / "drive.csv")

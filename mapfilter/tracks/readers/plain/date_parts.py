@@ -1,30 +1,45 @@
-"""Times of a plain CSV in parts: columns of the year, month, day, hour, minute and second."""
+"""Times of a plain CSV in parts: year, month and day, or a date; hour, minute and second."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from mapfilter._constants import DAY_S
 from mapfilter._types import Floats
+from mapfilter.tracks.readers.clocks.times import parse_times
 from mapfilter.tracks.readers.plain.fields import FIELDS
 from mapfilter.tracks.readers.plain.headers import columns_of
 from mapfilter.tracks.readers.texts.columns import Columns
 
-_PARTS = (("year",), ("month",), ("day",), ("hour",), ("min", "minute"), ("sec", "second"))
+_DAY_PARTS = (("year",), ("month",), ("day",))
+_DATE = "date"
+_TIME_PARTS = (
+    ("hour", "hours", "hh"),
+    ("min", "minute", "minutes", "mm"),
+    ("sec", "second", "seconds", "ss"),
+)
 _NANO = "nano"
 """What a receiver of u-blox adds to its rounded seconds."""
 _UTC = "itow"
-_LAST = (0, 12, 31, 23, 59, 60)
+_LAST = (23, 59, 60)
 _YEARS = 1980, 2099
+_YEARS_S = 315_532_800.0, 4_102_444_800.0
+_DIGITS = re.compile(r"^((?:19|20)\d\d)(\d\d)(\d\d)$")
+"""A date without separators, such as 20260501."""
 
 
 def _columns(names: Sequence[str], own: Collection[str]) -> list[str]:
     """Return the columns of all parts; an empty list where one lacks, or there are other times."""
-    found = [next((name for name in some if name in names), "") for some in _PARTS]
-    whole = {*FIELDS["time"]}.intersection(names) or columns_of("time", names, ())
-    once = all(name and names.count(name) == 1 and name not in own for name in found)
-    return found if once and not whole else []
+    times = {*FIELDS["time"]}.intersection(names) | {*columns_of("time", names, ())}
+    for day in (_DAY_PARTS, ((_DATE,),)):
+        found = [next((name for name in some if name in names), "") for some in day + _TIME_PARTS]
+        once = all(name and names.count(name) == 1 and name not in own for name in found)
+        if once and not times - {*found}:
+            return found
+    return []
 
 
 def of_parts(names: tuple[str, ...], own: Collection[str] = ()) -> tuple[str, ...]:
@@ -39,32 +54,49 @@ def of_parts(names: tuple[str, ...], own: Collection[str] = ()) -> tuple[str, ..
     """
     if not (parts := _columns(names, own)):
         return names
-    utc = _UTC in names
-    nameless = {*parts, *((_NANO, _UTC) if utc else ())} - {*own, parts[3]}
+    utc, hour = _UTC in names, parts[-3]
+    nameless = {*parts, *((_NANO, _UTC) if utc else ())} - {*own, hour}
     time = "time (utc)" if utc else "time"
-    return tuple(time if name == parts[3] else "" if name in nameless else name for name in names)
+    return tuple(time if name == hour else "" if name in nameless else name for name in names)
 
 
 def parts_of_dates(rows: Columns, own: Collection[str] = ()) -> Columns:
     """Return columns in which that of the hours holds whole times, where there are all parts."""
     if not (parts := _columns(rows.names, own)):
         return rows
-    numbers = [rows.number(name) for name in parts]
-    good = (numbers[0] >= _YEARS[0]) & (numbers[0] <= _YEARS[1])
-    for number, least, most in zip(numbers[1:], (1, 1, 0, 0, 0), _LAST[1:], strict=True):
-        good &= (number >= least) & (number <= most)
+    *day, hour = parts[:-2]
+    midnight_s = _of_dates(rows) if day == [_DATE] else _of_numbers(rows, day)
+    good = np.isfinite(midnight_s)
+    if day == [_DATE] and not good.any():
+        # Of a date that is not understood the reader of times tells how to write it.
+        return rows.joined(_DATE, hour)
+    numbers = [rows.number(name) for name in parts[-3:]]
+    for number, most in zip(numbers, _LAST, strict=True):
+        good &= (number >= 0) & (number <= most)
     nano = rows.number(_NANO) if _UTC in rows.names and rows.has(_NANO) else np.zeros(len(rows))
-    seconds = [np.where(good, number, 0.0) for number in numbers]
-    texts = _whole(seconds, np.where(good, np.nan_to_num(nano), 0.0))
+    hours, minutes, seconds = (np.where(good, number, 0.0) for number in numbers)
+    elapsed_us = (hours * 60 + minutes) * 60e6 + seconds * 1e6 + np.nan_to_num(nano) / 1e3
+    whole_us = np.where(good, midnight_s, 0.0) * 1e6 + np.round(np.where(good, elapsed_us, 0.0))
+    texts = np.datetime_as_string(whole_us.astype(np.int64).astype("datetime64[us]"), unit="us")
     rows.reading.note(f"time: columns {', '.join(parts)}")
-    return rows.filled(parts[3], np.where(good, texts, "").astype(object))
+    return rows.filled(hour, np.where(good, texts, "").astype(object))
 
 
-def _whole(parts: Sequence[Floats], nano: Floats) -> np.ndarray:
-    """Return times as ISO 8601, to the microsecond."""
-    year, month, day, hour, minute, second = parts
-    months = (np.maximum(year, 1970) - 1970) * 12 + np.maximum(month, 1) - 1
-    first = months.astype(np.int64).astype("datetime64[M]").astype("datetime64[us]")
-    elapsed_us = (((np.maximum(day, 1) - 1) * 24 + hour) * 60 + minute) * 60e6 + second * 1e6
-    whole = first + np.round(elapsed_us + nano / 1e3).astype(np.int64).astype("timedelta64[us]")
-    return np.asarray(np.datetime_as_string(whole, unit="us"))
+def _of_dates(rows: Columns) -> Floats:
+    """Return the seconds from 1970 of the midnights of dates; NaN where they are not understood."""
+    words, which = np.unique(rows.texts(_DATE).astype(np.str_), return_inverse=True)
+    plain = [_DIGITS.sub(r"\1-\2-\3", word) for word in words.tolist()]
+    time_s, _ = parse_times(np.array(plain, dtype=object))
+    time_s = np.where((time_s >= _YEARS_S[0]) & (time_s < _YEARS_S[1]), time_s, np.nan)
+    return np.asarray((time_s // DAY_S * DAY_S)[which])
+
+
+def _of_numbers(rows: Columns, day: Sequence[str]) -> Floats:
+    """Return the seconds from 1970 of the midnights of years, months and days; NaN for no dates."""
+    year, month, date = numbers = [rows.number(name) for name in day]
+    good = (year >= _YEARS[0]) & (year <= _YEARS[1])
+    for number, most in zip(numbers[1:], (12, 31), strict=True):
+        good &= (number >= 1) & (number <= most)
+    months = np.where(good, (year - 1970) * 12 + month - 1, 0.0)
+    first_s = months.astype(np.int64).astype("datetime64[M]").astype("datetime64[s]")
+    return np.where(good, first_s.astype(np.int64) + (date - 1) * DAY_S, np.nan)

@@ -5,21 +5,42 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
+import numpy as np
+
 from mapfilter.tracks.readers.plain.mapped import Mapped
+from mapfilter.tracks.readers.texts.columns import Columns
 
 _DATE = "date"
 _A_DATE = re.compile(r"(\d{4}([-./])\d{1,2}\2\d{1,2}|\d{1,2}([-./])\d{1,2}\3\d{4})\.?")
 """With four digits of the year: others may be a version, such as 4.2.15."""
 _OF_DAY = re.compile(r"\d{1,2}:\d\d")
+_DIGITS_OF_DAY = re.compile(r"\d{5,6}(\.\d*)?")
+"""Hours, minutes and seconds without separators, such as 101530; a spreadsheet drops a 0 before."""
+_DIGITS = re.compile(r"\d{5,6}|(?:19|20)\d{6}")
+_ORDERS = {
+    "year, month, day": (r"^\s*((?:19|20)\d\d)(\d\d)(\d\d)\s*$", r"\1-\2-\3"),
+    "year (of the century), month, day": (r"^\s*(\d\d)(\d\d)(\d\d)\s*$", r"20\1-\2-\3"),
+    "day, month, year (of the century)": (r"^\s*(\d\d)(\d\d)(\d\d)\s*$", r"20\3-\2-\1"),
+}
+"""Dates without separators: the first has eight digits."""
+_FIRST_DAY, _LAST_DAY = np.datetime64("2016-01-01"), np.datetime64("2036-01-01")
+"""Of such a date with six digits, which may be read in two orders."""
+
+OF_DAY = "time: taken for hours, minutes and seconds of the day in one number, as 101530"
 
 
 def with_dates(mapped: Mapped) -> Mapped:
     """Return columns with times of day after the dates of a column of their own, if there is one.
 
-    That is the column ``date``, else the only one that is no field's and begins with a date.
+    That is the column ``date``, else the only one that is no field's and begins with a date. Both
+    may be digits without separators, such as 20260501 or 010526 and 101530.
     """
     rows, name = mapped.rows, mapped.rows.find(*mapped.names("time"))
-    if name in (None, _DATE) or not _OF_DAY.match(rows.first_text(name)):
+    if name is None or name == _DATE:
+        return mapped
+    if _DIGITS_OF_DAY.fullmatch(rows.first_text(name)):
+        return _of_digits(mapped, name)
+    if not _OF_DAY.match(rows.first_text(name)):
         return mapped
     others = (one for one in rows.names if one not in mapped.taken)
     found = [one for one in others if _A_DATE.fullmatch(rows.first_text(one))]
@@ -27,6 +48,45 @@ def with_dates(mapped: Mapped) -> Mapped:
         found = [_DATE]
     if len(found) != 1:
         return mapped
-    rows.reading.note(f"time: columns {found[0]} and {name}")
-    joined = rows.joined(found[0], name)
-    return replace(mapped, rows=joined, beside=(found[0],), date=found[0])
+    return _joined(mapped, rows, found[0], name)
+
+
+def _joined(mapped: Mapped, rows: Columns, date: str, name: str) -> Mapped:
+    rows.reading.note(f"time: columns {date} and {name}")
+    return replace(mapped, rows=rows.joined(date, name), beside=(date,), date=date)
+
+
+def _of_digits(mapped: Mapped, name: str) -> Mapped:
+    """Return columns with times of digits after dates of digits, if a column has such dates."""
+    rows = mapped.rows
+    dates = [one for one in rows.names if "date" in one and one not in mapped.taken]
+    date = _DATE if _DATE in dates else dates[0] if len(dates) == 1 else ""
+    given = np.unique(rows.texts(date)[rows.with_digits(date)].astype(np.str_)).tolist()
+    if not given or not all(_DIGITS.fullmatch(one) for one in given):
+        return mapped
+    order = rows.reading.date_order or _order(given)
+    if not order:
+        rows.reading.note(OF_DAY)
+        rows.reading.note(f"{date}: {given[0]}: day or year first? Write 2026-05-01")
+        return mapped
+    if not rows.reading.date_order and order != next(iter(_ORDERS)):
+        rows.reading.note(f"{date}: {order}")
+    rows.reading.date_order = order
+    changed = rows.rewritten(r"^\s*(\d{5})(\.\d*)?\s*$", r"0\1\2", name)
+    changed = changed.rewritten(r"^\s*(\d\d)(\d\d)(\d\d)", r"\1:\2:\3", name)
+    changed = changed.rewritten(r"^\s*(\d{5})\s*$", r"0\1", date)
+    return _joined(mapped, changed.rewritten(*_ORDERS[order], date), date, name)
+
+
+def _order(given: list[str]) -> str:
+    """Return in which order dates of digits are written; "" where none or two would do."""
+    found = []
+    for order, (pattern, by) in _ORDERS.items():
+        written = [re.sub(pattern, by, one.zfill(6)) for one in given]
+        try:
+            days = np.array(written, dtype="datetime64[D]")
+        except ValueError:
+            continue
+        if days.size and days.min() >= _FIRST_DAY and days.max() < _LAST_DAY:
+            found.append(order)
+    return found[0] if len(found) == 1 else ""

@@ -7,6 +7,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
+import pyarrow as pa
 
 from mapfilter._constants import DAY_S
 from mapfilter._types import Floats
@@ -24,7 +25,9 @@ from mapfilter.tracks.readers.clocks.times import (
     utc_from_week_s,
     without_midnights,
 )
+from mapfilter.tracks.readers.clocks.written_dates import are_compact, order_of, with_year_first
 from mapfilter.tracks.readers.format import ReadOptions
+from mapfilter.tracks.readers.plain.dates import OF_DAY
 from mapfilter.tracks.readers.plain.headers import columns_of
 from mapfilter.tracks.readers.plain.mapped import Mapped
 from mapfilter.tracks.readers.plain.weeks import (
@@ -49,7 +52,6 @@ _EARLY_S, _RECENT_S, _LATEST_S = 9e8, 1.6e9, 2.2e9
 """Unix times of 1998, 2020 and 2039."""
 _SAME_DATE = "time: the date stays the same over midnight: times go on with the next day"
 _PAUSE_S = 600.0
-_OF_DAY = "time: taken for hours, minutes and seconds of the day in one number, as 101530"
 _LONG, _SHORT, _JUMP, _FEWEST_JUMPS = 300.0, 20.0, 40.0, 3
 """Of times, their steps and the jumps between their minutes, to tell them from seconds."""
 _DAYS = "time: days since 1900, as a spreadsheet writes them"
@@ -88,9 +90,9 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
             counted_s = utc_from_week_s(weeks_of(mapped.rows, week, reading), number)
             return over_stuck_weeks(reading, counted_s, week)
         number = _without_digits(reading, number)
-        if _OF_DAY not in reading.notes:
+        if OF_DAY not in reading.notes:
             _check_milliseconds(mapped, reading, number)
-        reading.clock = Clock("monotonic", from_midnight=_OF_DAY in reading.notes)
+        reading.clock = Clock("monotonic", from_midnight=OF_DAY in reading.notes)
         return over_days(reading, over_weeks(reading, number))
     for remarks in (reading.notes, reading.ignored):
         remarks[:] = [
@@ -101,8 +103,11 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
     names = mapped.names("time")
     # A zone that is given is that of the local times of all files.
     rows, name = mapped.rows, mapped.rows.find(*names) or ""
-    zone = "UTC" if "utc" in name else options.zone
+    is_utc, by_zone = "utc" in name, reading.by_zone
+    zone = "UTC" if is_utc else options.zone
     time_s, zoned = rows.times(*names, zone=zone, after_s=reading.last_s)
+    # Times of a column in UTC need no zone of a place.
+    reading.by_zone = by_zone if is_utc else reading.by_zone
     reading.clock = Clock("utc") if zoned else Clock("local", zone)
     _note_gps(reading, name, known)
     if len(time_s) and not np.isfinite(time_s).any():
@@ -151,11 +156,13 @@ def _best_of(there: list[str], rows: Columns, reading: Reading) -> str:
 def _certainty(name: str, text: str) -> int:
     """Return 3 for times in UTC, 2 for local ones, 1 for other numbers, 0 for others."""
     number = text.replace(",", ".")
-    if _NUMBER.fullmatch(number):
+    if _NUMBER.fullmatch(number) and not are_compact(np.array([float(number)])):
         # Ticks since a phone was started are large, too.
         seconds = float(unix_seconds([float(number)])[0])
         sure = _EARLY_S < seconds < _LATEST_S and np.isnan(_since_1980(name, seconds))
         return 3 if sure else 1
+    column = pa.chunked_array([[text]])
+    text = with_year_first(column, order_of(column))[0].as_py()
     time_s, zoned = parse_times(np.array([text], dtype=object), "UTC" if "utc" in name else "")
     return (3 if zoned else 2) if np.isfinite(time_s).all() else 0
 
@@ -176,9 +183,9 @@ def _without_digits(reading: Reading, number: Floats) -> Floats:
     # From one minute to the next such numbers jump by 40.
     jumps = (steps > _JUMP) & (steps <= _JUMP + _SHORT)
     long = steps[steps <= _JUMP + _SHORT].sum() > _LONG and jumps.sum() >= _FEWEST_JUMPS
-    if not (long or _OF_DAY in reading.notes):
+    if not (long or OF_DAY in reading.notes):
         return number
-    reading.note(_OF_DAY)
+    reading.note(OF_DAY)
     counted = number.copy()
     counted[known] = 3600 * hours + 60 * minutes + seconds
     return counted

@@ -24,6 +24,7 @@ from mapfilter.tracks.readers.clocks.times import (
     seconds_of_day,
     unix_seconds,
 )
+from mapfilter.tracks.readers.clocks.written_dates import are_compact, order_of, with_year_first
 from mapfilter.tracks.readers.recorded.reading import Reading
 
 _NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
@@ -125,16 +126,31 @@ class Columns:
         if self.decimal_comma and layout == "ISO8601":
             rows = self.rewritten(r"^(\s*\d+),(\d+\s*)$", r"\1.\2", *names)
         column = rows._raw(*names)
-        if column is not None and layout == "ISO8601":
+        if column is None:
+            return parse_times(rows.texts(*names), zone, layout, after_s)
+        if layout == "ISO8601":
             try:
                 number = np.asarray(pc.cast(column, pa.float64()).to_numpy(), dtype=np.float64)
             except pa.ArrowInvalid:
                 pass
             else:
-                return unix_seconds(np.where(np.abs(number) > LEAST_UNIX_S, number, np.nan)), True
-        if column is not None and (found := plain_times(column, zone, layout, after_s)) is not None:
+                if not are_compact(number):
+                    unix = np.where(np.abs(number) > LEAST_UNIX_S, number, np.nan)
+                    return unix_seconds(unix), True
+        if (found := plain_times(column, zone, layout, after_s)) is not None:
             return found
+        if layout == "ISO8601":
+            rows = rows._with_year_first(column, names)
         return parse_times(rows.texts(*names), zone, layout, after_s)
+
+    def _with_year_first(self, column: pa.ChunkedArray, names: Sequence[str]) -> Columns:
+        """Return columns with a column of times in the order of ISO 8601; note another one."""
+        reading, name = self.reading, self.find(*names) or ""
+        if not reading.date_order and (order := order_of(column)):
+            reading.date_order = order
+            reading.note(f"time: the {order} first in dates with slashes or hyphens")
+        ordered = with_year_first(column, reading.date_order)
+        return replace(self, _columns={**self._columns, self.names.index(name): ordered})
 
     def times_of_part(
         self, *names: str, zone: str = "", layout: str = "ISO8601"

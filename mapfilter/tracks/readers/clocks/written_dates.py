@@ -1,0 +1,90 @@
+"""Dates as programs and spreadsheets write them, in the order of ISO 8601."""
+
+from __future__ import annotations
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from mapfilter._types import Floats
+
+_COMPACT = r"^((?:19|20)\d\d)(\d\d)(\d\d)(\d\d)(\d\d)(\d\d)"
+"""A date and a time in one number, such as 20260501101530, with milliseconds or without."""
+_COMPACT_RANGES = ((1.9e13, 2.1e13), (1.9e16, 2.1e16))
+_YEAR_LAST = r"^(\d\d?)([/-])(\d\d?)[/-]((?:19|20)\d\d)\b"
+_YEAR_FIRST = {"day": r"\4-\3-\1", "month": r"\4-\1-\3"}
+_LAST_MONTH = 12
+_DAY_OF_WEEK = r"^(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun),?\s+"
+_CLOCK = r"\d\d:\d\d:\d\d"
+_DAY = rf"{_DAY_OF_WEEK}(\w{{3}}) +(\d\d?) ({_CLOCK})"
+_REWRITTEN = (
+    # A zone's name after its offset, as Java writes it.
+    (r"(Z|[+-]\d\d:?\d\d)\[[A-Za-z_/+-]+\]$", r"\1"),
+    # Java's Date.toString(), such as Fri May 01 10:00:00 GMT+02:00 2026; and a date of mails.
+    (rf"{_DAY} (?:GMT|UTC)([+-]\S+) (\d{{4}})$", r"\2-\1-\5 \3\4"),
+    (rf"{_DAY} (?:GMT|UTC) (\d{{4}})$", r"\2-\1-\4 \3Z"),
+    (rf"{_DAY} (\d{{4}})$", r"\2-\1-\4 \3"),
+    (rf"{_DAY_OF_WEEK}(\d\d? \w{{3}} \d{{4}} {_CLOCK})", r"\1"),
+    (rf"{_COMPACT}$", r"\1-\2-\3 \4:\5:\6"),
+    (rf"{_COMPACT}\.?(\d{{3}})$", r"\1-\2-\3 \4:\5:\6.\7"),
+)
+
+
+def are_compact(numbers: Floats) -> bool:
+    """Return whether numbers are dates and times without separators: no Unix time is so large.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> are_compact(np.array([20260501101530.0])), are_compact(np.array([1777629330000.0]))
+    (True, False)
+    """
+    return any(bool(((numbers >= low) & (numbers < high)).any()) for low, high in _COMPACT_RANGES)
+
+
+def order_of(column: pa.ChunkedArray) -> str:
+    """Return whether dates with the year at the end begin with the day or the month.
+
+    Returns
+    -------
+    str
+        "day" or "month" where a number above 12 shows it, and none the contrary; else "".
+
+    Examples
+    --------
+    >>> order_of(pa.chunked_array([["01/05/2026 10:00:00", "13/05/2026 10:00:00"]]))
+    'day'
+    >>> order_of(pa.chunked_array([["01/05/2026 10:00:00", "02/05/2026 10:00:00"]]))
+    ''
+    """
+    dates = pc.unique(pc.utf8_slice_codeunits(pc.utf8_trim_whitespace(column), 0, 10))
+    parts = pc.extract_regex(dates, r"^(?P<first>\d\d?)[/-](?P<second>\d\d?)[/-](?:19|20)\d\d")
+    late = {}
+    for name in ("first", "second"):
+        number = pc.cast(pc.struct_field(parts, name), pa.int64())
+        late[name] = bool(pc.any(pc.greater(number, _LAST_MONTH)).as_py())
+    if late["first"] == late["second"]:
+        return ""
+    return "day" if late["first"] else "month"
+
+
+def with_year_first(column: pa.ChunkedArray, order: str) -> pa.ChunkedArray:
+    """Return texts of times whose dates have the order of ISO 8601.
+
+    Parameters
+    ----------
+    column : pyarrow.ChunkedArray of str
+    order : str
+        Of dates such as 13/05/2026, as of :func:`order_of`; "" leaves them.
+
+    Examples
+    --------
+    >>> given = ["13/5/2026 10:00", "20260513100000", "Wed May 13 10:00:00 GMT+02:00 2026"]
+    >>> with_year_first(pa.chunked_array([given]), "day").to_pylist()
+    ['2026-5-13 10:00', '2026-05-13 10:00:00', '13-May-2026 10:00:00+02:00']
+    """
+    found = pc.utf8_trim_whitespace(column)
+    for pattern, by in _REWRITTEN:
+        found = pc.replace_substring_regex(found, pattern, by)
+    if order not in _YEAR_FIRST:
+        return found
+    return pc.replace_substring_regex(found, _YEAR_LAST, _YEAR_FIRST[order])
