@@ -16,6 +16,7 @@ from mapfilter.tracks.checks.beyond_crs import within_crs
 from mapfilter.tracks.checks.far_apart import check_far_apart
 from mapfilter.tracks.checks.mirrored import mirrored_notes
 from mapfilter.tracks.checks.receiver_speeds import check_speeds
+from mapfilter.tracks.checks.two_phones import two_phones_notes
 from mapfilter.tracks.joining.alignment import Alignment, align
 from mapfilter.tracks.joining.equal_times import in_order
 from mapfilter.tracks.joining.frame import Frame
@@ -66,7 +67,7 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
     frame = Frame(shifted, options.crs, options.origin_deg, options.about_deg)
     shifted, beyond = within_crs(shifted, frame.crs, frame.local)
     notes = [*alignment.notes, *frame.notes, *beyond]
-    notes += [*_speed_notes(shifted, frame), *_list_notes(recordings)]
+    notes += [*_speed_notes(shifted, frame), *_list_notes(recordings), *two_phones_notes(shifted)]
     true_alone = set(options.truth) - set(options.measured)
     measured = [r for r in shifted if r.path not in true_alone]
     sensors = _sensors(measured, frame, options.truth, notes)
