@@ -127,7 +127,7 @@ def _undone(crs: str, east_m: Floats, north_m: Floats) -> Iterator[tuple[str, Fl
 def _of_another_zone(
     crs: str, lon_deg: Floats, lat_deg: Floats
 ) -> Iterator[tuple[str, Floats, Floats]]:
-    """Yield the metres that positions have in the UTM zone of their place, taken for those of a CRS.
+    """Yield metres of positions in the UTM zone of their place, taken for those of a CRS.
 
     Metres of a log that states another zone than theirs lie in that zone.
     """
