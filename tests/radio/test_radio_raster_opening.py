@@ -76,6 +76,14 @@ def test_which_folders_hold_rasters(tmp_path):
     assert not is_raster_folder(tmp_path / "A.ASC")
 
 
+def test_rasters_in_folders_of_bands_are_named(tmp_path):
+    for band in ("L800", "L1800"):
+        (tmp_path / band).mkdir()
+        (tmp_path / band / "A.asc").write_text("a grid")
+    with pytest.raises(InputError, match=r"they are in folders in it \(L1800, L800\): name one"):
+        open_rasters(tmp_path, "level")
+
+
 QUANTITIES = [
     (None, [("", "dBm"), ("", "dBm")], "level"),
     (None, [("loss", ""), ("", "dB")], "loss"),
