@@ -241,4 +241,28 @@ def test_an_export_of_a_cars_diagnosis_is_read(tmp_path):
     found = read_recording(path)
     np.testing.assert_allclose(found.tables["odometry"]["speed_mps"], 10.0)
     np.testing.assert_allclose(found.tables["positions"]["speed_mps"], 10.0)
-    assert found.unread == ("gps time", "g(x)")
+    assert found.unread == ("device time", "g(x)")
+    assert found.clock.kind == "utc"
+
+
+def test_units_behind_values_are_those_of_a_header(tmp_path):
+    """Levels were refused, and speeds not read."""
+    rows = [
+        f"{1_778_666_400 + i},60.17,24.94,7,8,{-90 - i % 3} dBm,18 km/h,{i} m" for i in range(9)
+    ]
+    path = tmp_path / "phone.csv"
+    path.write_text("\n".join(["time,lat,lon,lac,ci,rsrp,Speed,Altitude", *rows]) + "\n")
+    found = read_recording(path)
+    assert found.tables["radio"]["level_dbm"].tolist() == [-90 - i % 3 for i in range(9)]
+    assert found.tables["positions"]["speed_mps"].to_numpy() == pytest.approx(5.0)
+    assert found.tables["positions"]["altitude_m"].tolist() == list(range(9))
+    assert "rsrp: dbm behind its values" in found.notes
+    assert "taken as missing" not in " ".join(found.notes)
+
+
+@pytest.mark.parametrize("last", ["-90", "-90 km/h", "-90 dB"])
+def test_units_that_not_all_values_have_are_none(tmp_path, last):
+    path = tmp_path / "phone.csv"
+    path.write_text(f"time,ci,rsrp\n1,8,-90 dBm\n2,8,-91 dBm\n3,8,-92 dBm\n4,8,{last}\n")
+    with pytest.raises(InputError, match="a unit in each field"):
+        read_recording(path)
