@@ -24,6 +24,7 @@ from mapfilter.tracks.joining.position_shift import (
 from mapfilter.tracks.joining.position_units import metres_about_middle
 from mapfilter.tracks.joining.speed_shift import (
     best_shift,
+    measured,
     shift_note,
     speed_agreement,
     speeds_of_places,
@@ -250,25 +251,26 @@ def _by_speed(
     if not min(lengths) > 0:
         return 0.0, 0.0
     grids = [np.arange(0.0, length, 1 / _RATE_HZ) for length in lengths]
-    a, b = (
-        np.interp(grid + track[0][0], *track)
-        for grid, track in zip(grids, (one, other), strict=True)
+    at_s = [grid + time[0] for grid, (time, _) in zip(grids, (one, other), strict=True)]
+    # Speeds within the gap of a receiver that is jammed are unknown.
+    known_a, known_b = (
+        measured(track, at).astype(np.float64) for at, track in zip(at_s, (one, other), strict=True)
     )
+    a, b = known_a * np.interp(at_s[0], *one), known_b * np.interp(at_s[1], *other)
     size = 1 << int(np.ceil(np.log2(len(a) + len(b))))
 
     def lagged(x: Floats, y: Floats) -> Floats:
         product = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
         return np.concatenate([product[-(len(y) - 1) :], product[: len(x)]])
 
-    ones_a, ones_b = np.ones(len(a)), np.ones(len(b))
-    count = np.round(lagged(ones_a, ones_b))
-    sum_a, sum_b = lagged(a, ones_b), lagged(ones_a, b)
+    count = np.round(lagged(known_a, known_b))
+    sum_a, sum_b = lagged(a, known_b), lagged(known_a, b)
     with np.errstate(divide="ignore", invalid="ignore"):
         shared = lagged(a, b) - sum_a * sum_b / count
-        spread_a = lagged(a**2, ones_b) - sum_a**2 / count
-        spread_b = lagged(ones_a, b**2) - sum_b**2 / count
+        spread_a = lagged(a**2, known_b) - sum_a**2 / count
+        spread_b = lagged(known_a, b**2) - sum_b**2 / count
         correlation = shared / np.sqrt(np.maximum(spread_a * spread_b, 1e-12))
-    correlation[count < max(10, COMMON_SHARE * min(len(a), len(b)))] = -1.0
+    correlation[count < max(10, COMMON_SHARE * min(known_a.sum(), known_b.sum()))] = -1.0
     best = int(np.nanargmax(correlation))
     shift_s = (best - (len(b) - 1)) / _RATE_HZ + one[0][0] - other[0][0]
     return float(shift_s), float(min(correlation[best], 1.0))

@@ -117,7 +117,7 @@ def _correlation(one: Speeds, other: Speeds, shift_s: float) -> float:
     # Means beside an end would fall there in both.
     at_s = np.arange(begin_s + _HALF_S, end_s - _HALF_S, _PERIOD_S)
     # While a receiver is jammed its speeds are not those of the ends of its gap.
-    at_s = at_s[_measured(one, at_s) & _measured(other, at_s - shift_s)]
+    at_s = at_s[measured(one, at_s) & measured(other, at_s - shift_s)]
     if _PERIOD_S * at_s.size < _FEWEST_S - 2 * _HALF_S:
         return float("nan")
     first, second = _smoothed(one, at_s), _smoothed(other, at_s - shift_s)
@@ -127,7 +127,7 @@ def _correlation(one: Speeds, other: Speeds, shift_s: float) -> float:
     return float(np.mean((first - first.mean()) * (second - second.mean()))) / spread
 
 
-def _measured(speeds: Speeds, at_s: Floats) -> Bools:
+def measured(speeds: Speeds, at_s: Floats) -> Bools:
     """Return at which moments, with half the time of a mean about them, speeds have no long gap."""
     time_s = speeds[0]
     gap_s = np.diff(time_s)
