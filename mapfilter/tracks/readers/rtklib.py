@@ -27,7 +27,7 @@ _HEADER = re.compile(
 )
 _PROGRAM = re.compile(r"^% program\s*:\s*(\S.*)$")
 _JST_S = 9 * 3600.0
-_WEEK = re.compile(rb"^\s*\d{1,4}[ \t,;]+\d{1,6}(?:\.\d*)?[ \t,;]", re.MULTILINE)
+_WEEK = re.compile(rb"^ ?\d{1,4} \d{1,6}(?:\.\d{0,9})? ", re.MULTILINE)
 _AS_DEGREES = "decimal degrees (solution format Lat/Lon/Height, ddd.ddd of RTKLIB)"
 
 

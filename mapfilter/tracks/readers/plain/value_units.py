@@ -12,7 +12,7 @@ from mapfilter._header_units import parted_unit
 from mapfilter.tracks.readers.texts.columns import MISSING, Columns
 
 _UNITS = ("dbm", "km/h", "kmh", "kph", "m/s", "mps", "mph", "knots", "kn", "kt", "ft", "m", "hpa")
-_WITH_UNIT = re.compile(rf"[-+]?\d[\d.,]*\s?({'|'.join(_UNITS)})", re.ASCII | re.IGNORECASE)
+_WITH_UNIT = re.compile(rf"\A[-+]?\d[\d.,]*\s?({'|'.join(_UNITS)})\Z", re.ASCII | re.IGNORECASE)
 
 
 def with_value_units(rows: Columns, own: Collection[str]) -> Columns:
