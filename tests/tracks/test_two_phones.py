@@ -43,3 +43,17 @@ def test_other_cells_or_levels_are_those_of_another_phone(write, other):
 def test_two_programs_on_one_phone_and_files_one_after_the_other_are_of_one(write):
     assert not noted(write("a.csv"), write("b.csv", 1, level_dbm=LEVEL_DBM + 1))
     assert not noted(write("a.csv"), write("b.csv", 600, ci=11703))
+
+
+def test_files_of_one_name_are_told_with_their_folders(tmp_path):
+    """``Acc.csv: accelerometer not used, Acc.csv has it`` told nothing."""
+    rows = [f"{1_778_000_000 + i / 10},0,0,9.8" for i in range(100)]
+    paths = [tmp_path / phone / "Acc.csv" for phone in ("mine", "yours")]
+    for path in paths:
+        path.parent.mkdir()
+        path.write_text("\n".join(["time,acc_x,acc_y,acc_z", *rows]) + "\n")
+    notes = mf.read_log(paths).notes
+    assert "yours/Acc.csv: accelerometer not used, mine/Acc.csv has it" in notes
+    shifted = mf.read_log(paths, offsets_s={"yours/Acc.csv": 60.0}).notes
+    assert "yours/Acc.csv: +60 s, as given" in shifted
+    assert not any("not used, mine" in note for note in shifted)

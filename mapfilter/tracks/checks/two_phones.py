@@ -25,7 +25,7 @@ def two_phones_notes(recordings: Sequence[Recording]) -> list[str]:
     recordings : sequence of Recording
         Of one journey, on one clock.
     """
-    having = [(one.path.name, rows) for one in recordings if (rows := _serving(one)) is not None]
+    having = [(one.name, rows) for one in recordings if (rows := _serving(one)) is not None]
     notes = []
     for name, rows in having[1:]:
         first, known = having[0]

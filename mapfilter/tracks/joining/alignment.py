@@ -78,14 +78,14 @@ def align(recordings: Sequence[Recording], given_s: Mapping[Path, float]) -> Ali
     for recording, dated_s in zip(recordings, early_s, strict=True):
         if recording.path in given_s:
             offsets.append(given_s[recording.path])
-            notes.append(f"{recording.path.name}: {given_s[recording.path]:+g} s, as given")
+            notes.append(f"{recording.name}: {given_s[recording.path]:+g} s, as given")
             continue
         offset_s, note = 0.0, ""
         if recording is not first:
             offset_s, note = _offset(recording, first, given_s.get(first.path, 0.0))
         offsets.append(dated_s + offset_s)
         if note:
-            notes.append(f"{recording.path.name}: {note}")
+            notes.append(f"{recording.name}: {note}")
     if not first.clock.absolute:
         notes += zoneless_note([one for one in recordings if one.path not in given_s])
     notes += apart_note(given, offsets)
@@ -115,13 +115,13 @@ def _offset(recording: Recording, given: Recording, late_s: float) -> tuple[floa
     same = clock.kind == first.clock.kind and clock.kind != "utc"
     if clock.absolute or (same and clock.kind == "local"):
         if one is None or other is None:
-            return 0.0, shift_note(first.path.name, _speed(first), _speed(recording))
-        return 0.0, _disagreement(first.path.name, one, other)
+            return 0.0, shift_note(first.name, _speed(first), _speed(recording))
+        return 0.0, _disagreement(first.name, one, other)
     if clock.kind == "local":
         return _zone(recording, first, one, other)
     if same and _common(recording, given) >= COMMON_SHARE:
         far = one is not None and other is not None and median_apart_m(one, other, 0.0, 0.1) > FAR_M
-        return 0.0, _disagreement(first.path.name, one, other) if far else ""
+        return 0.0, _disagreement(first.name, one, other) if far else ""
     if one is not None and other is not None:
         low, high = one[0][0] - other[0][-1], one[0][-1] - other[0][0]
         step_s = max(1.0, (high - low) / _MOST_SHIFTS)
@@ -136,9 +136,9 @@ def _offset(recording: Recording, given: Recording, late_s: float) -> tuple[floa
     shift, correlation = _by_speed(*speeds)
     if correlation >= _LEAST_CORRELATION:
         return shift, f"{shift:+.1f} s, by speeds (correlation {correlation:.2f})"
-    expected = f"positions or speeds in common with {first.path.name}"
+    expected = f"positions or speeds in common with {first.name}"
     got = f"times in {clock}, and none"
-    hint = f"--offset {recording.path.name}=SECONDS, the seconds to add to its times"
+    hint = f"--offset {recording.name}=SECONDS, the seconds to add to its times"
     hint += " (Unix time of its time 0)" if first.clock.absolute else ""
     raise fail(InputError, str(recording.path), expected, got, hint)
 
@@ -162,12 +162,12 @@ def _zone(
             shift_s = float(shifts[np.nanargmin(apart)])
             near = float(np.nanmin(apart))
             note = f"local time is UTC{_clock(-shift_s)} (by positions, median {near:.1f} m apart)"
-            fine = _disagreement(first.path.name, one, (other[0] + shift_s, *other[1:]))
+            fine = _disagreement(first.name, one, (other[0] + shift_s, *other[1:]))
             return shift_s, f"{note}; {fine}" if fine else note
     shifts = -_QUARTER_S * np.array(_ZONE_QUARTERS)
     common = np.array([_common(recording, first, shift) for shift in shifts])
     if common.max() <= 0:
-        expected = f"local times that overlap those of {first.path.name} in some zone"
+        expected = f"local times that overlap those of {first.name} in some zone"
         hint = "recordings of two journeys, or a wrong date; else give --zone or --offset"
         raise fail(InputError, str(recording.path), expected, "none", hint)
     found = best_shift(shifts[common > 0], _speed(first), _speed(recording))
