@@ -6,17 +6,17 @@ import re
 from collections.abc import Collection
 from dataclasses import replace
 
-import numpy as np
-
 from mapfilter._header_units import parted_unit
-from mapfilter.tracks.readers.texts.columns import MISSING, Columns
+from mapfilter.tracks.readers.texts.columns import Columns
 
 _UNITS = ("dbm", "km/h", "kmh", "kph", "m/s", "mps", "mph", "knots", "kn", "kt", "ft", "m", "hpa")
 _WITH_UNIT = re.compile(rf"\A[-+]?\d[\d.,]*\s?({'|'.join(_UNITS)})\Z", re.ASCII | re.IGNORECASE)
 
 
 def with_value_units(rows: Columns, own: Collection[str]) -> Columns:
-    """Return columns whose values have no unit, where all have one; their names state it.
+    """Return columns whose values have no unit, where the first one has one; their names state it.
+
+    Values with another unit stay as they are, and are no numbers.
 
     Parameters
     ----------
@@ -29,22 +29,19 @@ def with_value_units(rows: Columns, own: Collection[str]) -> Columns:
     for at, name in enumerate(rows.names):
         if name in own or not name or rows.names.count(name) > 1:
             continue
-        unit = known.get(name) or _unit(rows, name)
-        if not unit:
+        if name not in known and (first := rows.first_text(name)):
+            known[name] = _unit(first, parted_unit(name)[1])
+        if not (unit := known.get(name, "")):
             continue
-        known[name] = unit
         rows = rows.rewritten(rf"(?i)^\s*([-+]?\d[\d.,]*)\s?{re.escape(unit)}\s*$", r"\1", name)
         rows.reading.note(f"{name}: {unit} behind its values")
         names[at] = name if parted_unit(name)[1] else f"{name} [{unit}]"
     return replace(rows, names=tuple(names))
 
 
-def _unit(rows: Columns, name: str) -> str:
-    """Return the unit behind all values of a column; "" where one lacks it, or has another."""
-    first = _WITH_UNIT.fullmatch(rows.first_text(name))
-    if first is None or (stated := parted_unit(name)[1]) not in ("", first[1].lower()):
+def _unit(first: str, stated: str) -> str:
+    """Return the unit behind the first value of a column; "" for none, or another than stated."""
+    found = _WITH_UNIT.match(first)
+    if found is None or not (of_value := parted_unit(f"x [{found[1]}]")[1]):
         return ""
-    words = np.unique(rows.texts(name).astype(np.str_)).tolist()
-    found = (_WITH_UNIT.fullmatch(word) for word in words if word not in MISSING)
-    same = all(one is not None and one[1].lower() == first[1].lower() for one in found)
-    return first[1].lower() if same and (stated or parted_unit(f"x [{first[1]}]")[1]) else ""
+    return found[1].lower() if stated in ("", of_value) else ""
