@@ -74,7 +74,7 @@ def with_year_first(column: pa.ChunkedArray, order: str) -> pa.ChunkedArray:
     ----------
     column : pyarrow.ChunkedArray of str
     order : str
-        Of dates such as 13/05/2026, as of :func:`order_of`; any other leaves them.
+        Of dates such as 13/05/2026, as of :func:`order_of`; "" leaves them.
 
     Examples
     --------
@@ -85,5 +85,6 @@ def with_year_first(column: pa.ChunkedArray, order: str) -> pa.ChunkedArray:
     found = pc.utf8_trim_whitespace(column)
     for pattern, by in _REWRITTEN:
         found = pc.replace_substring_regex(found, pattern, by)
-    first = _YEAR_FIRST.get(order)
-    return found if first is None else pc.replace_substring_regex(found, _YEAR_LAST, first)
+    if order not in _YEAR_FIRST:
+        return found
+    return pc.replace_substring_regex(found, _YEAR_LAST, _YEAR_FIRST[order])
