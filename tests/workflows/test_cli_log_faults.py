@@ -119,7 +119,8 @@ def test_no_log(replay, tmp_path, world):
 def test_a_wrong_crs_puts_a_log_elsewhere(log, replay):
     (log / "log.json").write_text('{"crs": "EPSG:32634"}')
     before = contents(log.parent)
-    told = "my-walk, truth: expected positions near the database's", "log of another area or zone"
+    where = "my-walk, truth: expected positions near the database's"
+    told = where, "a wrong CRS: EPSG:32634 is stated for metres of EPSG:32635"
     note = "mapfilter: note: projected from EPSG:32634 to EPSG:32635: positions, headings by -5.2"
     assert_refused(replay(log), note, *told)
     assert contents(log.parent) == before
