@@ -93,6 +93,12 @@ def test_unequal_steps_have_the_noise_that_they_have_by_themselves():
     assert leg.across_m**2 == pytest.approx(across_m2)
 
 
+def test_a_leg_of_sums_has_the_noise_of_the_steps_in_these():
+    summed = leg_of(*[MotionStep(2.8, 0.0, rows=2.0)] * 2).step
+    assert (summed.step_m, summed.rows) == (pytest.approx(5.6), pytest.approx(4.0))
+    assert leg_of(MotionStep(5.6, 0.0, rows=4.0)).equal_rows == pytest.approx(4.0)
+
+
 def test_a_leg_of_one_row_is_that_row():
     step = MotionStep(5.0, 0.5, 0.1, sampling_sd_m=0.25)
     assert leg_of(step).step is step
@@ -154,6 +160,22 @@ def test_all_beliefs_have_been_moved_when_something_is_read_of_them():
         assert after.leg == NO_LEG
         gone_m = after.belief.summary.mean[0] - before.belief.summary.mean[0]
         assert gone_m == pytest.approx(3 * 1.4 * np.cos(0.3), abs=1.0)
+
+
+def test_a_course_that_waits_ends_before_headings_of_a_compass_begin():
+    few = {"max_particles": 400, "min_search_particles": 400, "min_particles": 200}
+    driven, rng = BayesFilter(vehicle=True, **few).over_area(TOWN.area()), np.random.default_rng(3)
+    state = driven.begin_at(*START_M, 1.0, rng)
+    errors = replace(state.belief, state=state.belief.state.copy())
+    # Hypotheses that all go north.
+    errors.state[BIAS] = np.pi / 2
+    state = replace(state, belief=errors, compass=False)
+    for time_s, heading_rad in ((1.0, np.nan), (2.0, np.pi / 2)):
+        motion = (MotionStep(3.0, heading_rad),)
+        state, output = driven.step(state, Epoch(time_s, motion), rng)
+    assert state.leg.rows == 1
+    assert abs(state.belief.summary.mean[1] - errors.summary.mean[1] - 3.0) < 0.5
+    assert output.fix.north_m == pytest.approx(START_M[1] + 6.0, abs=1.0)
 
 
 @pytest.mark.parametrize("status", [Status.CONVERGED, Status.UNCERTAIN])
