@@ -14,7 +14,7 @@ from mapfilter.models.street_motion import BIAS, STATES, MotionErrors
 from mapfilter.positioning.bayes.beliefs.belief_changes import turned_at_jump
 from mapfilter.positioning.bayes.beliefs.moving import moved
 from mapfilter.positioning.bayes.rivals.half_turns import HalfTurns
-from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise, after_takeover
 from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules, PullRules
 from mapfilter.positioning.bayes.state import BayesState
@@ -166,6 +166,14 @@ def test_rivals_that_are_refuted_by_readings_count():
     assert [one.start_m for one in found.held] == [0.0]
     # The second one has lost another nat against the main belief, which loses two.
     assert found.half_turns.walkers == pytest.approx(1.0 + 1 / (1 + 0.01 * exp(-1.0)))
+
+
+def test_where_the_phone_was_mirrored_nobody_has_turned_round():
+    mirrored, turned = replace(rival(9.0, half_turn=False), hold=Hold(-1.0, 3.0)), rival(2.0)
+    before = rival(2.0, start_m=-40.0)
+    left = after_takeover((mirrored, turned, before), mirrored)
+    assert [one.tells_half_turn for one in left] == [False, True]
+    assert HalfTurns().after(left, left[1:], mirrored.belief) == HalfTurns()
 
 
 def test_a_rival_without_any_hypothesis_left_counts_whatever_its_odds():
