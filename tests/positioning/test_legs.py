@@ -7,14 +7,18 @@ import numpy as np
 import pytest
 from made_town import Town, walk_log
 
-from mapfilter.filters.contract import MotionStep, Status
+from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.street_motion import BIAS, LOG_SCALE, STATES, MotionErrors, moving
 from mapfilter.models.street_motion import noise_of_step as noise
 from mapfilter.positioning.bayes.beliefs.legs import LEG_M, NO_LEG, Lead, may_wait
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning
 from mapfilter.positioning.bayes.options import BayesFilter
-from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
+from mapfilter.positioning.bayes.sources.evidence_options import EvidenceOptions
+from mapfilter.positioning.bayes.sources.radio import RadioSource
+from mapfilter.positioning.bayes.sources.usable import UsableEpoch
+from mapfilter.positioning.bayes.waiting import waits
+from mapfilter.positioning.epochs import Difference, Epoch, GnssFix, Pseudorange, ReportRow
 from mapfilter.positioning.merging import epochs
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.serving.state_file import decode, encode
@@ -185,12 +189,44 @@ def test_what_lasts_for_one_epoch_does_not_wait(status):
     assert (after.leg, after.belief is state.belief) == (NO_LEG, False)
 
 
-def test_a_doubtful_rest_does_not_wait():
-    state, rng = begun()
-    for rest, waits in ((Rest(0.0, pace_mps=1.4), True), (None, True)):
-        watched = replace(state, watch=state.watch._replace(rest=rest))
-        ((after, _),) = walked(watched, rng, MotionStep(0.0, 0.3))
-        assert (after.belief is state.belief) is waits
+REST = Rest(0.0, pace_mps=1.4)
+DOUBTFUL = replace(REST, is_doubtful=True)
+FIX = GnssFix(*START_M, 25.0, 25.0, 0.0)
+TIMED = (ReportRow("serving", "a", None, None, -70.0, 0, 1.0),)
+SATELLITES = (Pseudorange("G01", 2e7, 5.0, (2e7, 0.0, 0.0)),)
+LATER = (Difference("a", "b", 40.0),)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "motion", "measured", "may"),
+    [
+        ({}, {}, Reason.USED, {}, True),
+        ({}, {"rest": REST}, Reason.USED, {}, True),
+        ({"rest": REST}, {"rest": REST}, Reason.USED, {}, True),
+        ({}, {"rest": DOUBTFUL}, Reason.USED, {}, False),
+        # Who goes on after a rest may have been carried.
+        ({"rest": REST}, {}, Reason.USED, {}, False),
+        ({}, {"rode_unheard": True}, Reason.USED, {}, False),
+        ({}, {"rest": REST, "rode_unheard": True}, Reason.USED, {}, False),
+        ({}, {}, Reason.MOTION_STUCK, {}, False),
+        ({}, {}, Reason.USED, {"gnss": FIX}, False),
+        ({}, {}, Reason.USED, {"radio": TIMED}, False),
+        ({}, {}, Reason.USED, {"pseudoranges": SATELLITES}, False),
+        ({}, {}, Reason.USED, {"tdoa": LATER}, False),
+    ],
+)
+def test_what_is_in_doubt_and_what_reads_beliefs_does_not_wait(
+    before, after, motion, measured, may
+):
+    state, _ = begun()
+    epoch = Epoch(1.0, (STEP,), **measured)
+    usable = UsableEpoch(state.watch._replace(**after), epoch, motion, Reason.USED, [])
+    state = replace(state, watch=state.watch._replace(**before))
+    by = positioner().beliefs, RadioSource(positioner().area, EvidenceOptions())
+    found = waits(*by, state, usable)
+    assert (found is not None) is may
+    assert not may or found(1.0)
+    assert waits(*by, replace(state, contested=True), usable) is None
 
 
 def test_a_search_waits_too_and_loses_nothing_of_the_way():
