@@ -85,5 +85,6 @@ def with_year_first(column: pa.ChunkedArray, order: str) -> pa.ChunkedArray:
     found = pc.utf8_trim_whitespace(column)
     for pattern, by in _REWRITTEN:
         found = pc.replace_substring_regex(found, pattern, by)
-    by = _YEAR_FIRST.get(order)
-    return found if by is None else pc.replace_substring_regex(found, _YEAR_LAST, by)
+    if order not in _YEAR_FIRST:
+        return found
+    return pc.replace_substring_regex(found, _YEAR_LAST, _YEAR_FIRST[order])

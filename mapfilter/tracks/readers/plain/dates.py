@@ -18,9 +18,9 @@ _DIGITS_OF_DAY = re.compile(r"\d{5,6}(\.\d*)?")
 """Hours, minutes and seconds without separators, such as 101530; a spreadsheet drops a 0 before."""
 _DIGITS = re.compile(r"\d{5,6}|(?:19|20)\d{6}")
 _ORDERS = {
-    "year, month, day": (r"^((?:19|20)\d\d)(\d\d)(\d\d)$", r"\1-\2-\3"),
-    "year (of the century), month, day": (r"^(\d\d)(\d\d)(\d\d)$", r"20\1-\2-\3"),
-    "day, month, year (of the century)": (r"^(\d\d)(\d\d)(\d\d)$", r"20\3-\2-\1"),
+    "year, month, day": (r"^\s*((?:19|20)\d\d)(\d\d)(\d\d)\s*$", r"\1-\2-\3"),
+    "year (of the century), month, day": (r"^\s*(\d\d)(\d\d)(\d\d)\s*$", r"20\1-\2-\3"),
+    "day, month, year (of the century)": (r"^\s*(\d\d)(\d\d)(\d\d)\s*$", r"20\3-\2-\1"),
 }
 """Dates without separators: the first has eight digits."""
 _FIRST_DAY, _LAST_DAY = np.datetime64("2016-01-01"), np.datetime64("2036-01-01")
