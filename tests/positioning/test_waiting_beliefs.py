@@ -8,7 +8,7 @@ from made_filters import belief
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.positioning.bayes.sources.usable import UsableEpoch
-from mapfilter.positioning.bayes.state import BayesState
+from mapfilter.positioning.bayes.state import BayesState, Reported
 from mapfilter.positioning.bayes.waiting import waits
 from mapfilter.positioning.epochs import Difference, Epoch, GnssFix, Pseudorange, ReportRow
 from mapfilter.positioning.sensors.rest import Rest
@@ -75,7 +75,14 @@ def test_what_is_compared_with_beliefs_does_not_wait(measured):
         {"state": replace(TRACKED, contested=True)}, {"state": replace(TRACKED, belief=None)},
         {"state": replace(TRACKED, status=Status.CONVERGED)},
         {"state": replace(TRACKED, status=Status.UNCERTAIN)},
+        # What was reported is of another belief: nobody has judged this one.
+        {"state": TRACKED.with_output(Reported(belief(), Status.TRACKING, 0.0, None))},
     ],
 )  # fmt: skip
 def test_a_belief_in_doubt_does_not_wait(more):
     assert rule(**more) is None
+
+
+def test_a_belief_that_was_reported_waits():
+    reported = Reported(TRACKED.belief, Status.TRACKING, 0.0, None)
+    assert rule(TRACKED.with_output(reported))(1e6)
