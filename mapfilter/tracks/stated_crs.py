@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pandas as pd
+
+from mapfilter._types import Floats
 
 _CRS, _BOUNDS = "crs", "bounds_m"
 _PLACE = ["east_m", "north_m"]
@@ -29,7 +29,8 @@ def placed_in(crs: str, rows: pd.DataFrame) -> pd.DataFrame:
     stating = rows.copy(deep=False)
     places_m = rows[_PLACE].to_numpy(dtype=np.float64)
     # A text, as pandas copies the attributes with every table that it makes.
-    stating.attrs = {**rows.attrs, _CRS: crs, _BOUNDS: json.dumps(_bounds_m(places_m))}
+    bounds_m = " ".join(map(repr, _bounds_m(places_m)))
+    stating.attrs = {**rows.attrs, _CRS: crs, _BOUNDS: bounds_m}
     return stating
 
 
@@ -39,16 +40,17 @@ def crs_stated(rows: pd.DataFrame) -> str:
         return ""
     places_m = rows[_PLACE].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=np.float64)
     within = np.zeros(len(rows), dtype=np.bool_)
-    for bounds_m in json.loads(rows.attrs[_BOUNDS]):
-        low_m, high_m = bounds_m[:2], bounds_m[2:]
-        within |= ((places_m >= low_m) & (places_m <= high_m)).all(axis=1)
+    for part_m in np.array(rows.attrs[_BOUNDS].split(), dtype=np.float64).reshape(-1, 4):
+        within |= ((places_m >= part_m[:2]) & (places_m <= part_m[2:])).all(axis=1)
     return str(rows.attrs[_CRS]) if within.all() else ""
 
 
-def _bounds_m(places_m: np.ndarray) -> list[list[float]]:
+def _bounds_m(places_m: Floats) -> list[float]:
     """Return west, south, east and north of each part of a way, with the place that ends it."""
     if not len(places_m):
         return []
     size = max(1, -(-len(places_m) // _PARTS))
     parts = (places_m[start : start + size + 1] for start in range(0, len(places_m), size))
-    return [[*part.min(axis=0).tolist(), *part.max(axis=0).tolist()] for part in parts]
+    return [
+        edge for part in parts for edge in (*part.min(axis=0).tolist(), *part.max(axis=0).tolist())
+    ]
