@@ -73,7 +73,7 @@ class Rivals:
         found = [one for one in weighed if one is not None]
         held = still_open(holds, found, main, state.reckoning.travelled_m)
         refuted = (one for one, now in zip(state.held, weighed, strict=True) if now is None)
-        half_turns = state.half_turns.after(found, held, main).without(refuted)
+        half_turns = state.half_turns.after(found, held, main).with_refuted(refuted)
         state = replace(state, half_turns=half_turns)
         best = winner(holds, held, main, rules.converge_log_odds)
         if best is None:
