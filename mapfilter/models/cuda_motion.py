@@ -29,9 +29,10 @@ def move(
     key: np.uint64,
     moved: Any,
     sampling_sd_m: float = 0.0,
+    rows: float = 1.0,
 ) -> None:
     """Fill all hypotheses (R, N) after one measured step, as :func:`street_motion.move` does."""
-    long_m, length_m, noise = noise_of_step(step_m, errors, sampling_sd_m)
+    long_m, length_m, noise = noise_of_step(step_m, errors, sampling_sd_m, rows)
     given = state, long_m, length_m, heading_rad, noise, key, moved
     _cuda.start(_move, state.shape[1], *given)
 
@@ -68,8 +69,10 @@ def _move(state, step_m, length_m, heading_rad, noise, key, moved):  # type: ign
     beside = _F(noise.turn_keep) * state[5, i] + _F(noise.turn_rad) * e
     beside = _F(noise.jump_rad) * e if _F(u) < _F(noise.jump) else beside
     longer = _F(noise.stretch_keep) * state[6, i] + _F(noise.stretch) * f
-    cosine, sine = cos_sin32(wrap32(_F(heading_rad) + lasting + beside))
-    along = _F(step_m) * exp32(steady + longer) + _F(noise.along_m) * a
+    late, early = _F(noise.late), _F(1.0 - noise.late)
+    aside, further = late * beside + early * state[5, i], late * longer + early * state[6, i]
+    cosine, sine = cos_sin32(wrap32(_F(heading_rad) + lasting + aside))
+    along = _F(step_m) * exp32(steady + further) + _F(noise.along_m) * a
     across = _F(noise.across_m) * b
     moved[0, i] = state[0, i] + (along * cosine - across * sine)
     moved[1, i] = state[1, i] + (along * sine + across * cosine)

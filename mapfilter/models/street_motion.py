@@ -127,14 +127,15 @@ def move(
     errors: MotionErrors,
     key: np.uint64,
     sampling_sd_m: float = 0.0,
+    rows: float = 1.0,
 ) -> Floats32:
     """Return all hypotheses (8 or more, N) after one measured step; further rows stay.
 
     The errors are added to the heading. A step of length 0 changes nothing. ``key`` is from
     :func:`mapfilter._kernels.draw_key`; ``sampling_sd_m`` is the step's own error, to each side,
-    which a step of length 0 does not have.
+    which a step of length 0 does not have, and ``rows`` how many measured steps it is the sum of.
     """
-    call, moved = moving(state, step_m, heading_rad, errors, key, sampling_sd_m)
+    call, moved = moving(state, step_m, heading_rad, errors, key, sampling_sd_m, rows)
     ONE.over(state.shape[1], call)
     return moved
 
@@ -148,10 +149,7 @@ def moving(
     sampling_sd_m: float = 0.0,
     rows: float = 1.0,
 ) -> tuple[Call, Floats32]:
-    """Return the call that does what :func:`move` does, and the array that it fills.
-
-    ``rows`` is how many measured steps the step is the sum of.
-    """
+    """Return the call that does what :func:`move` does, and the array that it fills."""
     long_m, length, noise = noise_of_step(step_m, errors, sampling_sd_m, rows)
     moved = np.empty_like(state)
     return (_move, state, long_m, length, heading_rad, noise, key, moved), moved

@@ -167,7 +167,12 @@ def headed(step: MotionStep, heading_rad: float) -> tuple[MotionStep, float]:
         return step, heading_rad
     # Each epoch has such a step: a copy by `dataclasses.replace` takes several times as long.
     with_heading = MotionStep(
-        step.step_m, heading_rad, step.turn_rad, step.spread_m, step.sampling_sd_m
+        step.step_m,
+        heading_rad,
+        step.turn_rad,
+        step.spread_m,
+        step.sampling_sd_m,
+        rows=step.rows,
     )
     return with_heading, heading_rad
 

@@ -55,14 +55,14 @@ def done(one):
 
 
 @pytest.mark.parametrize("step_m", [1.4, -0.7, 0.0])
-@pytest.mark.parametrize("more", [0, 1])
-def test_motion(step_m, more):
+@pytest.mark.parametrize(("more", "rows"), [(0, 1.0), (1, 1.0), (0, 4.0)])
+def test_motion(step_m, more, rows):
     p, key = Particles(COUNT), np.uint64(2**63 + 11)
     state = np.vstack([p.state[:8], p.state[:more] - 7.0])
     errors = MotionErrors(disturbances_per_m=0.3, rate_rad_per_m=0.02)
     found = np.full_like(state, nan)
-    cuda_motion.move(state, step_m, 2.5, errors, key, found, 0.2)
-    expected = move(state, step_m, 2.5, errors, key, 0.2)
+    cuda_motion.move(state, step_m, 2.5, errors, key, found, 0.2, rows)
+    expected = move(state, step_m, 2.5, errors, key, 0.2, rows)
     np.testing.assert_allclose(found, expected, rtol=2e-6, atol=1e-5)
     assert step_m == 0 or np.abs(found[:2] - state[:2]).max() > 0.5
 

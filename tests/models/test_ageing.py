@@ -1,5 +1,7 @@
 """Ageing of what hypotheses keep, read through the numbers of chosen ones, against NumPy."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -43,6 +45,19 @@ def test_copies_are_aged_as_the_columns_that_they_are_of(before):
     again = np.array([5, 5, 1499], dtype=np.int32)
     twice = copies_of(Copies(before, chosen), again)
     np.testing.assert_array_equal(twice.made(), before[:, chosen][:, again])
+
+
+def test_copies_of_a_few_records_take_no_room_for_all():
+    records, chosen = new_records(20_000, WIDTH), np.array([7, 7, 19_999], dtype=np.int32)
+    records[:] = np.arange(20_000)[:, None]
+    few = Copies(kept_in(records, WIDTH), chosen)
+    tracemalloc.start()
+    try:
+        made, (_, peak_bytes) = few.made(), tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    np.testing.assert_array_equal(made, np.tile(chosen, (WIDTH, 1)))
+    assert peak_bytes < records.nbytes / 10
 
 
 def test_what_has_columns_of_its_own_is_aged_in_their_order(before):

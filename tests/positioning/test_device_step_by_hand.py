@@ -51,11 +51,11 @@ def test_a_step_is_moved_and_weighed_by_the_map(calls, step_m, cells, per_m):
         AREA, cell_ids=(), level_dbm=np.zeros((7, 9, 2), dtype=np.float32), carriers={}
     )  # fmt: skip
     model = BayesModel(area, weights=replace(WEIGHTS, weight_per_m=per_m))
-    before, motion = np.array([-1.0, -2.0]), MotionStep(step_m, 0.5, sampling_sd_m=3.0)
+    before, motion = np.array([-1.0, -2.0]), MotionStep(step_m, 0.5, sampling_sd_m=3.0, rows=4.0)
     moved, weighed = DeviceStep(model, Placed()).move(INSIDE.state, before, motion, np.uint64(9))
-    ((state, *rest, key, into, sampling_sd_m),) = named(calls, "move")
+    ((state, *rest, key, into, sampling_sd_m, rows),) = named(calls, "move")
     assert (state is INSIDE.state, rest) == (True, [step_m, 0.5, model.motion])
-    assert (key, into is moved, sampling_sd_m) == (np.uint64(9), True, 3.0)
+    assert (key, into is moved, sampling_sd_m, rows) == (np.uint64(9), True, 3.0, 4.0)
     assert moved is not INSIDE.state
     ((given, log_map, *more, over, beyond, into),) = named(calls, "weigh_by_ways")
     assert (given is moved, into is weighed) == (True, True)

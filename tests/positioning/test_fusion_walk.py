@@ -1,7 +1,7 @@
 """A Kalman-type filter's walk step by step: motion, starts, noise that lasts, statuses."""
 
 from dataclasses import asdict, replace
-from math import cos, hypot, inf, log10, nan, pi, radians, sin
+from math import cos, exp, hypot, inf, log10, nan, pi, radians, sin
 
 import numpy as np
 import pytest
@@ -134,7 +134,9 @@ def test_steps_shift_and_spread():
     np.testing.assert_allclose(noise[:2, :2], expected)
     np.testing.assert_allclose(noise[2, :2], before * left[:, 1])
     drifted = before + radians(0.6) ** 2 * 1.0
-    np.testing.assert_allclose(noise[2:, 2:], np.diag([drifted, 0.0, 0.0]))
+    # A rate of turns that is known wanders within 150 s by 0.05 degrees a second.
+    wandered = radians(0.05) ** 2 * (1 - exp(-4.0 / 150.0))
+    np.testing.assert_allclose(noise[2:, 2:], np.diag([drifted, 0.0, wandered]))
     assert made.moved_m == 13.0
     np.testing.assert_allclose(made.belief.means[0], [*(5.0 + way), 0.0, 0.0, 0.0])
     np.testing.assert_allclose(made.belief.covariances[0, :2, :2], 9.0 * np.eye(2) + expected)

@@ -9,12 +9,12 @@ import pytest
 from made_filters import SEARCHING, STATE, TRACKING, Beliefs, belief, gaining, weighed
 from made_filters import rival as alternative
 
-from mapfilter.filters.contract import MotionStep
+from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.models.street_motion import BIAS, STATES, MotionErrors
 from mapfilter.positioning.bayes.beliefs.belief_changes import turned_at_jump
 from mapfilter.positioning.bayes.beliefs.moving import moved
 from mapfilter.positioning.bayes.rivals.half_turns import HalfTurns
-from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise, after_takeover
 from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules, PullRules
 from mapfilter.positioning.bayes.state import BayesState
@@ -166,6 +166,21 @@ def test_rivals_that_are_refuted_by_readings_count():
     assert [one.start_m for one in found.held] == [0.0]
     # The second one has lost another nat against the main belief, which loses two.
     assert found.half_turns.walkers == pytest.approx(1.0 + 1 / (1 + 0.01 * exp(-1.0)))
+
+
+def test_where_the_phone_was_mirrored_nobody_has_turned_round():
+    mirrored, turned = replace(rival(9.0, half_turn=False), hold=Hold(-1.0, 3.0)), rival(2.0)
+    before = rival(2.0, start_m=-40.0)
+    left = after_takeover((mirrored, turned, before), mirrored)
+    assert [one.tells_half_turn for one in left] == [False, True]
+    assert HalfTurns().after(left, left[1:], mirrored.belief) == HalfTurns()
+
+
+def test_a_rival_without_any_hypothesis_left_counts_whatever_its_odds():
+    held = rival(1.0), rival(1.0, start_m=1.0, half_turn=False)
+    none_left = gaining(0.0, reason=Reason.NO_CANDIDATES_LEFT)
+    found, _ = weighed(Beliefs(held_otherwise=none_left), replace(STATE, held=held))
+    assert (found.held, found.half_turns) == ((), HalfTurns(1.0))
 
 
 def test_a_belief_that_takes_over_a_search_has_half_turns_of_its_own():

@@ -13,10 +13,11 @@ from mapfilter.models.street_motion import BIAS, LOG_SCALE, STATES, MotionErrors
 from mapfilter.models.street_motion import noise_of_step as noise
 from mapfilter.positioning.bayes.beliefs.legs import LEG_M, NO_LEG, Lead, may_wait
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning
+from mapfilter.positioning.bayes.beliefs.smoothing import BayesSmoother
 from mapfilter.positioning.bayes.options import BayesFilter
+from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.merging import epochs
-from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.serving.state_file import decode, encode
 
 TOWN = Town.of(1)
@@ -93,6 +94,12 @@ def test_unequal_steps_have_the_noise_that_they_have_by_themselves():
     assert leg.across_m**2 == pytest.approx(across_m2)
 
 
+def test_a_leg_of_sums_has_the_noise_of_the_steps_in_these():
+    summed = leg_of(*[MotionStep(2.8, 0.0, rows=2.0)] * 2).step
+    assert (summed.step_m, summed.rows) == (pytest.approx(5.6), pytest.approx(4.0))
+    assert leg_of(MotionStep(5.6, 0.0, rows=4.0)).equal_rows == pytest.approx(4.0)
+
+
 def test_a_leg_of_one_row_is_that_row():
     step = MotionStep(5.0, 0.5, 0.1, sampling_sd_m=0.25)
     assert leg_of(step).step is step
@@ -156,19 +163,78 @@ def test_all_beliefs_have_been_moved_when_something_is_read_of_them():
         assert gone_m == pytest.approx(3 * 1.4 * np.cos(0.3), abs=1.0)
 
 
+def centre_m(belief):
+    return belief.summary.mean[:2]
+
+
+def test_a_leg_ends_where_one_turns_aside_or_goes_back():
+    ahead_m = 2 * 1.4 * np.array([np.cos(0.3), np.sin(0.3)])
+    for step, waiting in ((MotionStep(1.4, 1.3), 1), (MotionStep(-0.7, 0.3), 0)):
+        state, rng = begun()
+        after, _ = walked(state, rng, STEP, STEP, step)[-1]
+        assert after.leg.rows == waiting
+        gone_m = centre_m(after.belief) - centre_m(state.belief)
+        np.testing.assert_allclose(gone_m, ahead_m * (1.0 if waiting else 0.75), atol=0.4)
+
+
+def test_beliefs_that_begin_at_a_jump_or_a_position_begin_where_one_is():
+    turned = MotionStep(1.4, 0.3 - np.pi)
+    fix = GnssFix(*START_M, 25.0, 25.0, 0.0)
+    for hold, more in ((Hold(), {"motion": (turned,)}), (Hold(1.0, np.pi), {"gnss": fix})):
+        state, rng = begun(hold=hold)
+        state, _ = walked(state, rng, STEP, STEP, STEP)[-1]
+        assert (state.leg.rows, state.held) == (3, ())
+        after, _ = positioner().step(state, Epoch(4.0, **more), rng)
+        assert len(after.held) > 0
+        for rival in after.held:
+            apart_m = centre_m(rival.belief) - centre_m(after.belief)
+            assert np.hypot(*apart_m) < 2.0
+
+
+def test_smoothing_keeps_beliefs_that_have_been_moved_and_the_last_one_as_it_is():
+    state, rng = begun()
+    smoother = BayesSmoother(positioner().area, MotionErrors(), every_m=1.0)
+    for time_s in range(1, 9):
+        before = state
+        state, output = positioner().step(before, Epoch(float(time_s), (STEP,)), rng)
+        smoother.add(before, state)
+    assert (state.leg.rows, [one.epoch for one in smoother.kept]) == (3, [4])
+    smoother.close()
+    last = smoother.kept[-1]
+    assert last.epoch == 7
+    weights = np.exp(last.log_weight)
+    place = np.average(last.state[:2], axis=1, weights=weights) + positioner().area.origin_m
+    assert place == pytest.approx([output.fix.east_m, output.fix.north_m], abs=0.05)
+
+
+def test_nothing_waits_for_a_belief_that_begins_anew():
+    state, rng = begun()
+    state, _ = walked(state, rng, STEP)[-1]
+    assert state.leg.rows == 1
+    assert state.begun_anew().leg == NO_LEG
+
+
+def test_a_course_that_waits_ends_before_headings_of_a_compass_begin():
+    few = {"max_particles": 400, "min_search_particles": 400, "min_particles": 200}
+    driven, rng = BayesFilter(vehicle=True, **few).over_area(TOWN.area()), np.random.default_rng(3)
+    state = driven.begin_at(*START_M, 1.0, rng)
+    errors = replace(state.belief, state=state.belief.state.copy())
+    # Hypotheses that all go north.
+    errors.state[BIAS] = np.pi / 2
+    state = replace(state, belief=errors, compass=False)
+    for time_s, heading_rad in ((1.0, np.nan), (2.0, np.pi / 2)):
+        motion = (MotionStep(3.0, heading_rad),)
+        state, output = driven.step(state, Epoch(time_s, motion), rng)
+    assert state.leg.rows == 1
+    assert abs(state.belief.summary.mean[1] - errors.summary.mean[1] - 3.0) < 0.5
+    assert output.fix.north_m == pytest.approx(START_M[1] + 6.0, abs=1.0)
+
+
 @pytest.mark.parametrize("status", [Status.CONVERGED, Status.UNCERTAIN])
 def test_what_lasts_for_one_epoch_does_not_wait(status):
     state, rng = begun(status=status)
     ((after, _),) = walked(state, rng, STEP)
     assert (after.leg, after.belief is state.belief) == (NO_LEG, False)
-
-
-def test_a_doubtful_rest_does_not_wait():
-    state, rng = begun()
-    for rest, waits in ((Rest(0.0, pace_mps=1.4), True), (None, True)):
-        watched = replace(state, watch=state.watch._replace(rest=rest))
-        ((after, _),) = walked(watched, rng, MotionStep(0.0, 0.3))
-        assert (after.belief is state.belief) is waits
 
 
 def test_a_search_waits_too_and_loses_nothing_of_the_way():

@@ -363,3 +363,14 @@ def test_the_layout_has_errors_behind_the_position():
     assert (
         hypot(*Reckoning().moved(MotionStep(5.0, 1.0), 1.0, OPTIONS, np.zeros(3))[1][2][:2]) == 5.0
     )
+
+
+@pytest.mark.parametrize("heading_rad", [0.4, nan])
+def test_a_step_that_is_a_sum_has_the_noise_of_what_it_sums(heading_rad):
+    begun, errors = Reckoning(alignment=Alignment(0.4, known=True)), np.zeros(3)
+    each, whole = (
+        begun.moved(MotionStep(rows * 1.4, heading_rad, 0.0, rows=rows), 1.0, OPTIONS, errors)
+        for rows in (1.0, 3.0)
+    )
+    assert each[2] is whole[2] is Reason.USED
+    np.testing.assert_allclose(whole[1][1][:2, :2], 3 * each[1][1][:2, :2], rtol=1e-12)

@@ -66,8 +66,8 @@ def test_a_table_without_a_usual_column_is_not_read_by_the_next_one():
 
 
 def test_turns_keep_it():
-    step, heading_rad = headed(MotionStep(9.0, nan, 0.25, sampling_sd_m=4.5), 1.0)
-    assert step == MotionStep(9.0, heading_rad, 0.25, step.spread_m, 4.5)
+    step, heading_rad = headed(MotionStep(9.0, nan, 0.25, sampling_sd_m=4.5, rows=3.0), 1.0)
+    assert step == MotionStep(9.0, heading_rad, 0.25, step.spread_m, 4.5, rows=3.0)
 
 
 def test_hypotheses_spread_to_all_sides_by_it():

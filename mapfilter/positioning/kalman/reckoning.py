@@ -246,9 +246,9 @@ class Reckoning(EqualByValue):
         shift[:2] = length_m * along - transition[:2, 2:] @ errors
         white_rad = radians(options.heading_sd_deg)
         cross_m = step.step_m * (min(white_rad, _TURNS_SD_RAD) if by_turns else white_rad)
-        noise[:2, :2] = options.step_sd_m**2 * np.outer(along, along)
+        noise[:2, :2] = step.rows * options.step_sd_m**2 * np.outer(along, along)
         noise[:2, :2] += step.sampling_sd_m**2 * np.eye(2) if step.step_m != 0 else 0.0
-        noise[:2, :2] += cross_m**2 * np.outer(across, across)
+        noise[:2, :2] += cross_m**2 / step.rows * np.outer(across, across)
         if self.headless_m or self.before_m or self.origin is not None:
             after = replace(after, headless_m=0.0, before_m=0.0, origin=None)
         return after, (transition, noise, shift), Reason.USED

@@ -81,9 +81,9 @@ class DeviceStep:
         """Move by one step and weigh by the map, as :meth:`BayesModel.move` does."""
         model, moved = self.model, self.device.arrays.empty_like(state)
         weighed, weights = log_weight.copy(), model.weights
-        errors, sampling_sd_m = model.motion, motion.sampling_sd_m
+        errors, more = model.motion, (motion.sampling_sd_m, motion.rows)
         step = motion.step_m, motion.heading_rad
-        cuda_motion.move(state, *step, errors, key, moved, sampling_sd_m)
+        cuda_motion.move(state, *step, errors, key, moved, *more)
         cost = BEYOND_COST_PER_M if model.area.cell_ids else weights.off_cost_per_m
         beyond = -cost / weights.weight_per_m if weights.weight_per_m > 0 else nan
         cuda_motion.weigh_by_ways(

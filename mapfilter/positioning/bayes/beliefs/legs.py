@@ -32,7 +32,7 @@ class Leg(NamedTuple):
     rows : int
         Their number; 0 where none waits.
     way_m, square_m2 : float
-        Sum of their lengths, and of the squares of these.
+        Sum of their lengths, and of the squares of these, each over the measured steps it is of.
     east_m, north_m : float
         Their sum, as measured.
     sampling_m2 : float
@@ -95,9 +95,8 @@ class Leg(NamedTuple):
         if length_m == 0:
             return self
         east_m, north_m = length_m * cos(heading_rad), length_m * sin(heading_rad)
-        sampling_m2 = step.sampling_sd_m**2
+        square_m2, sampling_m2 = length_m * length_m / step.rows, step.sampling_sd_m**2
         if not self.rows:
-            square_m2 = length_m * length_m
             return Leg(1, length_m, square_m2, east_m, north_m, sampling_m2, reckoning, step)
         if self.way_m + length_m > LEG_M:
             return None
@@ -107,7 +106,7 @@ class Leg(NamedTuple):
         return Leg(
             self.rows + 1,
             self.way_m + length_m,
-            self.square_m2 + length_m * length_m,
+            self.square_m2 + square_m2,
             self.east_m + east_m,
             self.north_m + north_m,
             self.sampling_m2 + sampling_m2,

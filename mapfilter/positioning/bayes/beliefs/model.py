@@ -113,7 +113,8 @@ class BayesModel(EvidenceModel):
     ) -> tuple[Floats32, Floats]:
         """Move by a step without any direction, each hypothesis on along the ways."""
         state = with_courses(state, motion.step_m, self.motion, self._log_map_at, key)
-        moved = move(state, motion.step_m, 0.0, self.motion, key, motion.sampling_sd_m)
+        more = motion.sampling_sd_m, motion.rows
+        moved = move(state, motion.step_m, 0.0, self.motion, key, *more)
         # Along narrow ways a raster is a few metres beside them: such cost no more than others.
         fit = np.minimum(self._log_map_at(moved[: NORTH + 1]) + _F(_BESIDE), _F(0.0))
         factors = self.weights.over(abs(motion.step_m))

@@ -185,7 +185,7 @@ class _Move:
     def by_row(self, row: MotionStep) -> None:
         """Move everything by one row of motion."""
         if self.by_course and self.belief is not None and isfinite(row.heading_rad):
-            self._count_from(self.belief, row.heading_rad)
+            self._count_from(row.heading_rad)
         measured, self.heading_rad = headed(row, self.heading_rad)
         if self.compass and measured.turned_sd_rad > 0:
             # A compass tells where the phone points afterwards.
@@ -208,10 +208,13 @@ class _Move:
         if why is not Reason.USED:
             self.unused.append(UnusedReading(self.epoch.time_s, "motion", "", why))
 
-    def _count_from(self, belief: MapBelief, heading_rad: float) -> None:
+    def _count_from(self, heading_rad: float) -> None:
         """Count what followed the ways from the first heading of a compass."""
         self.by_course, self.held, self.unaided = False, (), ()
-        self.belief = counted_from(belief, heading_rad)
+        # What waits is part of the course.
+        self.finish_leg()
+        assert self.belief is not None, "there is one to count"
+        self.belief = counted_from(self.belief, heading_rad)
         if self.alternative is not None:
             other = counted_from(self.alternative.belief, heading_rad)
             self.alternative = replace(self.alternative, belief=other)

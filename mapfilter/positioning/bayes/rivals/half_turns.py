@@ -100,6 +100,11 @@ class HalfTurns:
         more = sum(1 / (1 + exp(min(log_odds, _LARGEST))) for log_odds in odds)
         return replace(self, walkers=self.walkers + more)
 
+    def with_refuted(self, refuted: Iterable[HeldOtherwise]) -> HalfTurns:
+        """Return the numbers with the half turns of rivals that nothing speaks for any more."""
+        more = sum(one.tells_half_turn for one in refuted)
+        return replace(self, walkers=self.walkers + more) if more else self
+
     def after(
         self, before: Sequence[HeldOtherwise], kept: Sequence[HeldOtherwise], main: ParticleBelief
     ) -> HalfTurns:

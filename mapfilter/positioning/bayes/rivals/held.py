@@ -267,7 +267,18 @@ def winner(
 
 
 def after_takeover(held: Sequence[HeldOtherwise], best: HeldOtherwise) -> tuple[HeldOtherwise, ...]:
-    """Return the others, with odds against the one that has taken over; none is ahead of it yet."""
+    """Return the others, with odds against the one that has taken over; none is ahead of it yet.
+
+    Those of the same jump no longer tell a half turn: whoever it is, the phone was moved there.
+    """
     gained = best.log_prior
-    others = (one for one in held if one is not best)
-    return tuple(replace(one, log_prior=one.log_prior - gained, ahead_m=nan) for one in others)
+    return tuple(
+        replace(
+            one,
+            log_prior=one.log_prior - gained,
+            ahead_m=nan,
+            tells_half_turn=one.tells_half_turn and one.start_m != best.start_m,
+        )
+        for one in held
+        if one is not best
+    )

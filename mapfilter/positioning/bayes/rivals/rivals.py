@@ -66,13 +66,15 @@ class Rivals:
         rng, filter_ = own_rng(time_s, Purpose.WEIGHED), self.beliefs.held_otherwise
         # Pseudoranges are compared with the main belief alone, whose total likelihood they leave.
         evidence = evidence.for_other_hypotheses()
-        weighed = (
+        weighed = [
             self._weighed(state, one, filter_, evidence, rng, measured=measured)
             for one in state.held
-        )
+        ]
         found = [one for one in weighed if one is not None]
         held = still_open(holds, found, main, state.reckoning.travelled_m)
-        state = replace(state, half_turns=state.half_turns.after(found, held, main))
+        refuted = (one for one, now in zip(state.held, weighed, strict=True) if now is None)
+        half_turns = state.half_turns.after(found, held, main).with_refuted(refuted)
+        state = replace(state, half_turns=half_turns)
         best = winner(holds, held, main, rules.converge_log_odds)
         if best is None:
             return replace(state, held=held)
