@@ -66,10 +66,10 @@ def parts_of_dates(rows: Columns, own: Collection[str] = ()) -> Columns:
         return rows
     *day, hour = parts[:-2]
     midnight_s = _of_dates(rows) if day == [_DATE] else _of_numbers(rows, day)
+    # The reader of times reads dates in other orders, or tells how to write them.
+    others = day == [_DATE] and not np.isfinite(midnight_s).any()
+    midnight_s = np.zeros(len(rows)) if others else midnight_s
     good = np.isfinite(midnight_s)
-    if day == [_DATE] and not good.any():
-        # Of a date that is not understood the reader of times tells how to write it.
-        return rows.joined(_DATE, hour)
     numbers = [rows.number(name) for name in parts[-3:]]
     for number, most in zip(numbers, _LAST, strict=True):
         good &= (number >= 0) & (number <= most)
@@ -79,7 +79,11 @@ def parts_of_dates(rows: Columns, own: Collection[str] = ()) -> Columns:
     whole_us = np.where(good, midnight_s, 0.0) * 1e6 + np.round(np.where(good, elapsed_us, 0.0))
     texts = np.datetime_as_string(whole_us.astype(np.int64).astype("datetime64[us]"), unit="us")
     rows.reading.note(f"time: columns {', '.join(parts)}")
-    return rows.filled(hour, np.where(good, texts, "").astype(object))
+    texts = np.where(good, texts, "").astype(object)
+    if others:
+        clocks = np.array([text.partition("T")[2] for text in texts.tolist()], dtype=object)
+        return rows.filled(hour, clocks).joined(_DATE, hour)
+    return rows.filled(hour, texts)
 
 
 def _of_dates(rows: Columns) -> Floats:

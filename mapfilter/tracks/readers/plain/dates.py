@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mapfilter._types import Floats
 from mapfilter.tracks.readers.plain.mapped import Mapped
 from mapfilter.tracks.readers.texts.columns import Columns
 
@@ -17,12 +18,16 @@ _OF_DAY = re.compile(r"\d{1,2}:\d\d")
 _DIGITS_OF_DAY = re.compile(r"\d{5,6}(\.\d*)?")
 """Hours, minutes and seconds without separators, such as 101530; a spreadsheet drops a 0 before."""
 _DIGITS = re.compile(r"\d{5,6}|(?:19|20)\d{6}")
+_NAMED_DATE = re.compile(r"(?<!up)date")
+"""In the name of a column, which is none of updates."""
 _ORDERS = {
-    "year, month, day": (r"^((?:19|20)\d\d)(\d\d)(\d\d)$", r"\1-\2-\3"),
-    "year (of the century), month, day": (r"^(\d\d)(\d\d)(\d\d)$", r"20\1-\2-\3"),
-    "day, month, year (of the century)": (r"^(\d\d)(\d\d)(\d\d)$", r"20\3-\2-\1"),
+    "year, month, day": (r"^\s*((?:19|20)\d\d)(\d\d)(\d\d)\s*$", r"\1-\2-\3"),
+    "year (of the century), month, day": (r"^\s*(\d\d)(\d\d)(\d\d)\s*$", r"20\1-\2-\3"),
+    "day, month, year (of the century)": (r"^\s*(\d\d)(\d\d)(\d\d)\s*$", r"20\3-\2-\1"),
 }
 """Dates without separators: the first has eight digits."""
+_WHOLE = 8
+_LEAST_OF_DAY = 0.9
 _FIRST_DAY, _LAST_DAY = np.datetime64("2016-01-01"), np.datetime64("2036-01-01")
 """Of such a date with six digits, which may be read in two orders."""
 
@@ -59,12 +64,20 @@ def _joined(mapped: Mapped, rows: Columns, date: str, name: str) -> Mapped:
 def _of_digits(mapped: Mapped, name: str) -> Mapped:
     """Return columns with times of digits after dates of digits, if a column has such dates."""
     rows = mapped.rows
-    dates = [one for one in rows.names if "date" in one and one not in mapped.taken]
-    date = _DATE if _DATE in dates else dates[0] if len(dates) == 1 else ""
+    dates = [one for one in rows.names if _NAMED_DATE.search(one) and one not in mapped.taken]
+    dates = [_DATE] if _DATE in dates else dates
+    if len(dates) != 1 or not _are_of_day(rows.number(name)):
+        return mapped
+    date = dates[0]
     given = np.unique(rows.texts(date)[rows.with_digits(date)].astype(np.str_)).tolist()
     if not given or not all(_DIGITS.fullmatch(one) for one in given):
         return mapped
-    order = rows.reading.date_order or _order(given)
+    orders = _orders(given)
+    order = rows.reading.date_order
+    if order not in _ORDERS:
+        order = orders[0] if len(orders) == 1 else ""
+    if not (order or orders):
+        return mapped
     if not order:
         rows.reading.note(OF_DAY)
         rows.reading.note(f"{date}: {given[0]}: day or year first? Write 2026-05-01")
@@ -78,15 +91,38 @@ def _of_digits(mapped: Mapped, name: str) -> Mapped:
     return _joined(mapped, changed.rewritten(*_ORDERS[order], date), date, name)
 
 
-def _order(given: list[str]) -> str:
-    """Return in which order dates of digits are written; "" where none or two would do."""
+def _are_of_day(number: Floats) -> bool:
+    """Return whether numbers are times of day, save a few; of the seconds of a day many are not."""
+    known, of_day = np.isfinite(number), np.isfinite(seconds_in_digits(number))
+    return bool(np.count_nonzero(of_day) >= _LEAST_OF_DAY * np.count_nonzero(known))
+
+
+def _orders(given: list[str]) -> list[str]:
+    """Return in which orders dates of digits may be written."""
     found = []
-    for order, (pattern, by) in _ORDERS.items():
+    whole = all(len(one) == _WHOLE for one in given)
+    for order in list(_ORDERS)[:1] if whole else list(_ORDERS)[1:]:
+        pattern, by = _ORDERS[order]
         written = [re.sub(pattern, by, one.zfill(6)) for one in given]
         try:
             days = np.array(written, dtype="datetime64[D]")
         except ValueError:
             continue
-        if days.size and days.min() >= _FIRST_DAY and days.max() < _LAST_DAY:
+        if whole or (days.min() >= _FIRST_DAY and days.max() < _LAST_DAY):
             found.append(order)
-    return found[0] if len(found) == 1 else ""
+    return found
+
+
+def seconds_in_digits(number: Floats) -> Floats:
+    """Return seconds of the day for times of day in one number; NaN for other numbers.
+
+    Examples
+    --------
+    >>> seconds_in_digits(np.array([101530.25, 101560.0, 241530.0])).tolist()
+    [36930.25, nan, nan]
+    """
+    known = np.isfinite(number)
+    hours, rest = np.divmod(np.where(known, number, 0.0), 10_000.0)
+    minutes, seconds = np.divmod(rest, 100.0)
+    of_day = known & (hours >= 0) & (hours < 24) & (minutes < 60) & (seconds < 60)
+    return np.where(of_day, 3600 * hours + 60 * minutes + seconds, np.nan)
