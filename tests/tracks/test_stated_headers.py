@@ -7,6 +7,7 @@ import pytest
 from mapfilter.errors import InputError
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
+from mapfilter.tracks.readers.recorded.recording import Clock
 
 TIME_S = np.arange(0.0, 20.0, 0.5)
 SPEED_MPS = 8.0 + np.sin(TIME_S)
@@ -241,4 +242,8 @@ def test_an_export_of_a_cars_diagnosis_is_read(tmp_path):
     found = read_recording(path)
     np.testing.assert_allclose(found.tables["odometry"]["speed_mps"], 10.0)
     np.testing.assert_allclose(found.tables["positions"]["speed_mps"], 10.0)
-    assert found.unread == ("gps time", "g(x)")
+    # Of the two times that with a zone is UTC.
+    assert found.clock == Clock("utc")
+    start_s = pd.Timestamp("2026-05-28T20:26:40Z").timestamp()
+    assert found.tables["positions"]["time_s"].tolist() == [start_s + k for k in range(9)]
+    assert found.unread == ("device time", "g(x)")
