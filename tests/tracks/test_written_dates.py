@@ -30,7 +30,9 @@ def read(tmp_path, header, times, zone="+00:00"):
         "Wed May 13 {} UTC 2026",
         "Wed May 13 {} 2026",
         '"Wed, 13 May 2026 {} GMT"',
+        "Wed May 13 2026 {} GMT+0000 (Coordinated Universal Time)",
         "2026-05-13T{}+00:00[Europe/London]",
+        "2026-05-13T{}+00:00[Etc/GMT+0]",
     ],
 )
 def test_dates_that_are_of_one_order_are_read(tmp_path, times):

@@ -26,11 +26,16 @@ _REWRITTEN = (
     # A comma before the time of day, as a browser writes it.
     (r"^(\d{1,4}[/-]\d\d?[/-]\d{1,4}),?\s+", r"\1 "),
     # A zone's name after its offset, as Java writes it.
-    (r"(Z|[+-]\d\d:?\d\d)\[[A-Za-z_/+-]+\]$", r"\1"),
+    (r"(Z|[+-]\d\d:?\d\d)\[[\w/+-]+\]$", r"\1"),
     # Java's Date.toString(), such as Fri May 01 10:00:00 GMT+02:00 2026; and a date of mails.
     (rf"{_DAY} (?:GMT|UTC)([+-]\S+) (\d{{4}})$", r"\2-\1-\5 \3\4"),
     (rf"{_DAY} (?:GMT|UTC) (\d{{4}})$", r"\2-\1-\4 \3Z"),
     (rf"{_DAY} (\d{{4}})$", r"\2-\1-\4 \3"),
+    # A browser's, such as Fri May 01 2026 10:00:00 GMT+0200 (CEST).
+    (
+        rf"{_DAY_OF_WEEK}(\w{{3}}) (\d\d) (\d{{4}}) ({_CLOCK}) GMT([+-]\d{{4}})(?: \(.*\))?$",
+        r"\2-\1-\3 \4\5",
+    ),
     (rf"{_DAY_OF_WEEK}(\d\d? \w{{3}} \d{{4}} {_CLOCK})", r"\1"),
     (rf"{_COMPACT}{_ZONE}$", r"\1-\2-\3 \4:\5:\6\7"),
     (rf"{_COMPACT}(?:\.?(\d{{3}})|\.(\d{{1,9}})){_ZONE}$", r"\1-\2-\3 \4:\5:\6.\7\8\9"),

@@ -27,8 +27,8 @@ _UTC = "itow"
 _LAST = (23, 59, 60)
 _YEARS = 1980, 2099
 _YEARS_S = 315_532_800.0, 4_102_444_800.0
-_DIGITS = re.compile(r"^((?:19|20)\d\d)(\d\d)(\d\d)$")
-"""A date without separators, such as 20260501."""
+_DAY = re.compile(r"^((?:19|20)\d\d)(-?)(\d\d)\2(\d\d)(?:[T ].*)?$")
+"""A date, also without separators, such as 20260501; its midnight and zone are left out."""
 
 
 def _columns(names: Sequence[str], own: Collection[str]) -> list[str]:
@@ -89,7 +89,7 @@ def parts_of_dates(rows: Columns, own: Collection[str] = ()) -> Columns:
 def _of_dates(rows: Columns) -> Floats:
     """Return the seconds from 1970 of the midnights of dates; NaN where they are not understood."""
     words, which = np.unique(rows.texts(_DATE).astype(np.str_), return_inverse=True)
-    plain = [_DIGITS.sub(r"\1-\2-\3", word) for word in words.tolist()]
+    plain = [_DAY.sub(r"\1-\3-\4", word) for word in words.tolist()]
     time_s, _ = parse_times(np.array(plain, dtype=object))
     time_s = np.where((time_s >= _YEARS_S[0]) & (time_s < _YEARS_S[1]), time_s, np.nan)
     return np.asarray((time_s // DAY_S * DAY_S)[which])
