@@ -104,7 +104,7 @@ class TrackLog(EqualByContent):
     imu: ImuNoise | None = None
     vehicle: bool | None = None
 
-    def __hash__(self) -> int:
+    def __hash__(self) -> int:  # type: ignore[override]
         """Return a hash of what is cheap to compare: equal logs have one hash."""
         start_utc_s = self.start_utc_s if np.isfinite(self.start_utc_s) else None
         return hash((self.crs, start_utc_s, *(len(getattr(self, table)) for table in TABLES)))

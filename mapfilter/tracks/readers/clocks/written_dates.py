@@ -62,7 +62,7 @@ def are_compact(numbers: Floats) -> bool:
         for least, most in _PARTS:
             rest, part = np.divmod(rest, 100.0)
             good &= (part >= least) & (part <= most)
-        count += np.count_nonzero(good)
+        count += int(np.count_nonzero(good))
     return bool(count > _LEAST_TIMES * np.count_nonzero(numbers >= LEAST_UNIX_S))
 
 
@@ -110,5 +110,6 @@ def with_year_first(column: pa.ChunkedArray, order: str) -> pa.ChunkedArray:
     found = pc.utf8_trim_whitespace(column)
     for pattern, by in _REWRITTEN:
         found = pc.replace_substring_regex(found, pattern, by)
-    by = _YEAR_FIRST.get(order)
-    return found if by is None else pc.replace_substring_regex(found, _YEAR_LAST, by)
+    if order not in _YEAR_FIRST:
+        return found
+    return pc.replace_substring_regex(found, _YEAR_LAST, _YEAR_FIRST[order])
