@@ -6,6 +6,7 @@ import pytest
 
 import mapfilter as mf
 from mapfilter.errors import InputError
+from mapfilter.tracks.readers.texts import text
 
 START_S = pd.Timestamp("2026-05-13T10:00:58Z").timestamp()
 
@@ -126,3 +127,16 @@ def test_a_whole_date_of_digits_may_be_of_any_year(tmp_path):
     """Before 2016 it was said to be of two orders."""
     log = read(tmp_path, "date,time", ["20150513,100058", "20150513,100059"])
     assert log.start_utc_s == pd.Timestamp("2015-05-13T10:00:58Z").timestamp()
+
+
+def test_parts_of_a_file_have_one_order(tmp_path, monkeypatch):
+    """The first was seconds of a day, the next ones Unix times; and 5 was no time."""
+    monkeypatch.setattr(text, "_PART_BYTES", 512)
+    clear = [f"130526,2359{n:02d}" for n in range(60)] + [f"140526,{n}" for n in range(60)]
+    log = read(tmp_path, "date,time", clear)
+    assert log.gnss["time_s"].tolist() == list(range(120))
+    assert log.start_utc_s == pd.Timestamp("2026-05-13T23:59:00Z").timestamp()
+    unclear = [one.replace("130526", "310526").replace("140526", "10626") for one in clear]
+    log = read(tmp_path, "date,time", unclear)
+    assert np.isnan(log.start_utc_s)
+    assert np.ptp(log.gnss["time_s"]) < 86_400

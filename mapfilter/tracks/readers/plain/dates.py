@@ -17,6 +17,7 @@ _A_DATE = re.compile(r"(\d{4}([-./])\d{1,2}\2\d{1,2}|\d{1,2}([-./])\d{1,2}\3\d{4
 _OF_DAY = re.compile(r"\d{1,2}:\d\d")
 _DIGITS_OF_DAY = re.compile(r"\d{5,6}(\.\d*)?")
 """Hours, minutes and seconds without separators, such as 101530; a spreadsheet drops a 0 before."""
+_FEW_DIGITS_OF_DAY = re.compile(r"\d{1,6}(\.\d*)?")
 _DIGITS = re.compile(r"\d{5,6}|(?:19|20)\d{6}")
 _NAMED_DATE = re.compile(r"(?<!up)date")
 """In the name of a column, which is none of updates."""
@@ -26,6 +27,7 @@ _ORDERS = {
     "day, month, year (of the century)": (r"^\s*(\d\d)(\d\d)(\d\d)\s*$", r"20\3-\2-\1"),
 }
 """Dates without separators: the first has eight digits."""
+_UNCLEAR = "day or year first"
 _WHOLE = 8
 _LEAST_OF_DAY = 0.9
 _FIRST_DAY, _LAST_DAY = np.datetime64("2016-01-01"), np.datetime64("2036-01-01")
@@ -43,7 +45,10 @@ def with_dates(mapped: Mapped) -> Mapped:
     rows, name = mapped.rows, mapped.rows.find(*mapped.names("time"))
     if name is None or name == _DATE:
         return mapped
-    if _DIGITS_OF_DAY.fullmatch(rows.first_text(name)):
+    # After midnight a later part of a file may begin with 5 for 00:00:05.
+    known = rows.reading.date_order in _ORDERS
+    digits = _FEW_DIGITS_OF_DAY if known else _DIGITS_OF_DAY
+    if digits.fullmatch(rows.first_text(name)):
         return _of_digits(mapped, name)
     if not _OF_DAY.match(rows.first_text(name)):
         return mapped
@@ -66,27 +71,28 @@ def _of_digits(mapped: Mapped, name: str) -> Mapped:
     rows = mapped.rows
     dates = [one for one in rows.names if _NAMED_DATE.search(one) and one not in mapped.taken]
     dates = [_DATE] if _DATE in dates else dates
-    if len(dates) != 1 or not _are_of_day(rows.number(name)):
+    order = rows.reading.date_order
+    # Later parts of a file are read as the first one.
+    if len(dates) != 1 or order == _UNCLEAR:
         return mapped
     date = dates[0]
-    given = np.unique(rows.texts(date)[rows.with_digits(date)].astype(np.str_)).tolist()
-    if not given or not all(_DIGITS.fullmatch(one) for one in given):
-        return mapped
-    orders = _orders(given)
-    order = rows.reading.date_order
     if order not in _ORDERS:
-        order = orders[0] if len(orders) == 1 else ""
-    if not (order or orders):
-        return mapped
-    if not order:
-        rows.reading.note(OF_DAY)
-        rows.reading.note(f"{date}: {given[0]}: day or year first? Write 2026-05-01")
-        return mapped
-    if not rows.reading.date_order and order != next(iter(_ORDERS)):
-        rows.reading.note(f"{date}: {order}")
-    rows.reading.date_order = order
-    changed = rows.rewritten(r"^\s*(\d{5})(\.\d*)?\s*$", r"0\1\2", name)
-    changed = changed.rewritten(r"^\s*(\d\d)(\d\d)(\d\d)", r"\1:\2:\3", name)
+        given = np.unique(rows.texts(date)[rows.with_digits(date)].astype(np.str_)).tolist()
+        if not (given and all(map(_DIGITS.fullmatch, given)) and _are_of_day(rows.number(name))):
+            return mapped
+        orders = _orders(given)
+        if not orders:
+            return mapped
+        if len(orders) > 1:
+            rows.reading.date_order = _UNCLEAR
+            rows.reading.note(OF_DAY)
+            rows.reading.note(f"{date}: {given[0]}: {_UNCLEAR}? Write 2026-05-01")
+            return mapped
+        order = rows.reading.date_order = orders[0]
+        if order != next(iter(_ORDERS)):
+            rows.reading.note(f"{date}: {order}")
+    changed = rows.rewritten(r"^\s*(\d{1,6}(?:\.\d*)?)\s*$", r"00000\1", name)
+    changed = changed.rewritten(r"^\d*(\d\d)(\d\d)(\d\d)(\.\d*)?$", r"\1:\2:\3\4", name)
     changed = changed.rewritten(r"^\s*(\d{5})\s*$", r"0\1", date)
     return _joined(mapped, changed.rewritten(*_ORDERS[order], date), date, name)
 
