@@ -11,6 +11,7 @@ from made_satellites import (
     rinex3_nav,
     rinex_nav,
     rinex_obs,
+    rtklib,
     smartloc,
     smartloc_raw,
 )
@@ -275,6 +276,7 @@ MADE: dict[str, tuple[str, str]] = {
     "rinex-obs/2": ("phone2.26o", rinex2_obs()),
     "rinex-nav": ("hour.26n", rinex_nav()),
     "rinex-nav/3": ("brdc.26p", rinex3_nav()),
+    "rtklib": ("rover.pos", rtklib()),
     "smartloc": ("Input.txt", smartloc()),
     "smartloc-raw": ("RXM-RAWX.csv", smartloc_raw()),
     "indoor": ("path.txt", indoor()),

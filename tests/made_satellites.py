@@ -95,6 +95,24 @@ def rinex2_obs() -> str:
     return "\n".join([*head, *rows]) + "\n"
 
 
+def rtklib() -> str:
+    head = [
+        "% program   : RTKPOST ver.2.4.3 b34",
+        "% obs start : 2026/05/01 10:00:18.0 GPST (week2416 468018.0s)",
+        "%",
+        "% (lat/lon/height=WGS84/ellipsoidal,Q=1:fix,2:float,5:single,ns=# of satellites)",
+        "%  GPST                  latitude(deg) longitude(deg)  height(m)   Q  ns   sdn(m)   sde(m)"
+        "   sdu(m)  sdne(m)  sdeu(m)  sdun(m) age(s)  ratio    vn(m/s)    ve(m/s)    vu(m/s)",
+    ]
+    rows = [
+        f"{clock(i, '%Y/%m/%d %H:%M:%S', 18)}.000   {LAT_DEG[i]:.9f}   {LON_DEG[i]:.9f}    20.1000 "
+        "  5   9   3.0000   1.0000   4.0000   0.1000   0.1000  -0.1000   0.00    0.0    "
+        "2.20000    0.00000    0.00000"
+        for i in range(COUNT)
+    ]
+    return "\n".join([*head, *rows]) + "\n"
+
+
 def rinex_nav() -> str:
     head = [
         f"{'     2              NAVIGATION DATA':<60}RINEX VERSION / TYPE",

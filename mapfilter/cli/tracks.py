@@ -153,7 +153,7 @@ def locate(
         )
     print_result(result.shown, as_json)
     if not result.figures["located"]:
-        reasons = ", ".join(result.figures["not_located"])
+        reasons = ", ".join(result.figures["not_located"]) or "the log has no report of a cell"
         print_message(f"nothing is located: {reasons}")
         raise typer.Exit(PARTIAL)
 

@@ -136,6 +136,10 @@ def _open(path: Path, verify: str, generation: str | None) -> RadioRouteDatabase
         found = "a file" if path.exists() else "nothing"
         aside = left_aside(path)
         hint = likely_of_no_file(path)
+        if path.exists():
+            hint = "a database is a folder, which a build writes"
+            if (path.parent / MANIFEST).is_file():
+                hint = f"a part of the database {path.parent}"
         if aside is not None:
             hint = f"a write that was cut short; the older database is {aside}, rename it"
         raise fail(StoreError, str(path), "a database folder", found, hint)

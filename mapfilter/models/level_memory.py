@@ -108,12 +108,12 @@ class LevelMemory:
     def __getstate__(self) -> dict[str, object]:
         return {name: self.__dict__[name] for name in self.__dataclass_fields__}
 
-    def start(self, count: int, arrays: Any = np) -> Floats32:
-        """Return what hypotheses keep before the first report, (width, count), by a module.
+    def start(self, count: int, arrays: Any = None) -> Floats32:
+        """Return what hypotheses keep before the first report, (width, count).
 
-        On the processor these are records (:mod:`mapfilter.models.record_tiles`).
+        These are records (:mod:`mapfilter.models.record_tiles`), or rows of a device's ``arrays``.
         """
-        if arrays is np:
+        if arrays is None:
             records = new_records(count, self.width)
             records[:] = 0.0
             kept = kept_in(records, self.width)

@@ -71,6 +71,8 @@ def read_estimate(path: str | Path) -> TrackEstimate:
         The file is missing, cut off, not an estimate or of a newer version.
     """
     path = Path(path)
+    if inside := sorted(path.glob("**/*.parquet"))[:1] if path.is_dir() else []:
+        raise fail(StoreError, str(path), "an estimate", "a folder", f"name the file: {inside[0]}")
     try:
         with (
             open_input(path, StoreError) as stream,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping
 from itertools import chain
-from pathlib import Path
 from typing import NamedTuple
 
 from mapfilter.errors import Faults, InputError, fail, listed
@@ -24,7 +23,7 @@ from mapfilter.radio.cell_rows import DEFAULT_HINT, REQUIRED, Row, row_of
 from mapfilter.radio.cell_rules import RANGES
 from mapfilter.radio.headings import Heading, places_named, resembling, unit_of
 from mapfilter.radio.plan_systems import stated_systems, unit_notes
-from mapfilter.radio.tables import MOST_TITLES, Table, read_table
+from mapfilter.radio.tables import MOST_TITLES, Table
 
 _ALLOWED = {*COLUMNS, "east", "north", "crs", *OFFSETS, *chain.from_iterable(ALIASES.values())}
 _OTHER_LAYOUTS: Mapping[Layout, str] = {
@@ -55,7 +54,7 @@ class PlanRows(NamedTuple):
 
 
 def read_plan(
-    path: Path,
+    table: Table,
     crs: str,
     faults: Faults,
     layout: Layout = "plan",
@@ -69,9 +68,9 @@ def read_plan(
     Raises
     ------
     InputError
-        The file cannot be read as a table, or its header is wrong.
+        Its header is wrong.
     """
-    table = read_table(path, "a cell plan")
+    path = table.path
     where, wrong = f"{path} header", Faults()
     if layout == "plan" and not columns:
         _check_titles(where, table)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,6 +29,10 @@ from mapfilter.radio.cell_rules import (
     site_fault,
     technology_faults,
 )
+
+if TYPE_CHECKING:
+    import geopandas as gpd
+    import pandas as pd
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +182,20 @@ class CellPlan:
                 found[key] = (*found.get(key, ()), cell.id)
         return found
 
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return a row for each cell, as :func:`mapfilter.read_cell_plan` takes it."""
+        from mapfilter.radio.plan_frames import plan_frame
+
+        return plan_frame(self)
+
+    def to_geodataframe(self) -> gpd.GeoDataFrame:
+        """Return the same with points in the CRS of the plan."""
+        import geopandas as gpd
+
+        places_m = np.array([(cell.east_m, cell.north_m) for cell in self.cells]).reshape(-1, 2)
+        points = gpd.points_from_xy(*places_m.T)
+        return gpd.GeoDataFrame(self.to_dataframe(), geometry=points, crs=self.crs)
+
     def __len__(self) -> int:
         return len(self.cells)
 
@@ -217,7 +236,7 @@ def _as_cells(given: object) -> tuple[Cell, ...]:
     cells = tuple(given) if isinstance(given, Iterable) and not table else (given,)
     wrong = [one for one in cells if not isinstance(one, Cell)]
     if wrong:
-        hint = "a table; read_cell_plan reads a CSV of it" if table else ""
+        hint = "a table; read_cell_plan reads it" if table else ""
         raise fail(InputError, "cell plan", "cells, each a Cell", shown(wrong[0]), hint)
     return tuple(one for one in cells if isinstance(one, Cell))
 

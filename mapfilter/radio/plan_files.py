@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from numbers import Real
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from mapfilter._annotations import Words
 from mapfilter._arguments import Entries, Setting, check_arguments, path_argument
@@ -18,6 +18,11 @@ from mapfilter.radio.cell_layouts import LAYOUTS, Layout
 from mapfilter.radio.cell_rules import STATED, check_fields
 from mapfilter.radio.cell_table import read_plan
 from mapfilter.radio.cells import Cell, CellPlan, check_cells
+from mapfilter.radio.plan_frames import is_frame, table_of_frame
+from mapfilter.radio.tables import read_table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _BOUNDS_M = Annotated[
     tuple[float, float, float, float] | None, Words("west, south, east, north in metres")
@@ -25,7 +30,7 @@ _BOUNDS_M = Annotated[
 
 
 def read_cell_plan(
-    path: Path | str,
+    path: Path | str | pd.DataFrame,
     crs: str,
     *,
     layout: Layout = "plan",
@@ -33,7 +38,7 @@ def read_cell_plan(
     defaults: Mapping[str, float] | None = None,
     bounds_m: Sequence[float] | Floats | None = None,
 ) -> CellPlan:
-    """Read a cell plan from a CSV file and bring it into ``crs``.
+    """Read a cell plan from a CSV file, a workbook or a table and bring it into ``crs``.
 
     Commas, semicolons or tabs, UTF-8, one header line; decimal commas where they separate nothing.
     Columns: cell, lat and lon (WGS 84) *or* east and north (in the CRS of a ``crs`` column, which
@@ -43,6 +48,8 @@ def read_cell_plan(
 
     Parameters
     ----------
+    path : path or pandas.DataFrame
+        A file, or such a table, as that of :meth:`CellPlan.to_dataframe`.
     crs : str
         Projected CRS of the plan.
     layout : {"plan", "atoll", "opencellid"}
@@ -69,7 +76,7 @@ def read_cell_plan(
     """
     check_arguments(
         "read_cell_plan",
-        path_argument("path", path),
+        *(() if is_frame(path) else (path_argument("path", path),)),
         keywords=[
             Setting("layout", layout, Layout),
             Entries("columns", columns, str, "a column's name", "the column of each field"),
@@ -77,13 +84,14 @@ def read_cell_plan(
             Setting("bounds_m", bounds_m, _BOUNDS_M),
         ],
     )
-    path = Path(path)
     faults = Faults()
     check_fields("read_cell_plan, columns", columns or {}, LAYOUTS["plan"], faults)
     check_fields("read_cell_plan, defaults", defaults or {}, STATED, faults)
     faults.raise_if_any(ConfigError)
     usual = {name: float(value) for name, value in (defaults or {}).items()}
-    rows, notes, inactive = read_plan(path, projected_crs(crs), faults, layout, columns, usual)
+    table = table_of_frame(path) if is_frame(path) else read_table(Path(path), "a cell plan")
+    path = table.path
+    rows, notes, inactive = read_plan(table, projected_crs(crs), faults, layout, columns, usual)
     known = {each.name for each in fields(Cell)}
     whole = [row for row in rows if not row.faulty]
     if layout == "opencellid" and whole:

@@ -23,8 +23,8 @@ from mapfilter.errors import Faults, InputError, MapfilterError, fail
 
 _LARGEST_BYTES = 1 << 26
 _LARGEST_UNPACKED_BYTES = 1 << 29
-_MOST_FIELDS = 5_000_000
-_MOST_COLUMNS = 1000
+MOST_FIELDS = 5_000_000
+MOST_COLUMNS = 1000
 MOST_TITLES = 10
 _SEPARATORS = (",", ";", "\t")
 _WIDE_SHARE = 0.4
@@ -129,7 +129,7 @@ def read_table(path: Path, what: str) -> Table:
             if any(field.strip() for field in row):
                 lines.append((reader.line_num, row))
                 fields += len(row)
-                if fields > _MOST_FIELDS:
+                if fields > MOST_FIELDS:
                     raise _too_large(path, what, reader.line_num)
     except csv.Error as error:
         raise fail(InputError, f"{path} row {reader.line_num}", "CSV", error) from error
@@ -138,8 +138,8 @@ def read_table(path: Path, what: str) -> Table:
     lines, titles = _without_titles(path, lines)
     notes += titles
     header = tuple(name.strip() for name in lines[0][1])
-    if len(header) > _MOST_COLUMNS:
-        expected = f"{what} of at most {_MOST_COLUMNS} columns"
+    if len(header) > MOST_COLUMNS:
+        expected = f"{what} of at most {MOST_COLUMNS} columns"
         raise fail(InputError, f"{path}, header", expected, len(header), "another file")
     return Table(path, separator, header, tuple(lines[1:]), notes)
 
@@ -227,7 +227,7 @@ def _read_workbook(path: Path, data: bytes, what: str) -> Table:
     lines = [(line, row) for line, row in texts if any(row)]
     if not lines:
         raise fail(InputError, str(path), "a header line and rows", "an empty sheet")
-    if sum(len(row) for _, row in lines) > _MOST_FIELDS:
+    if sum(len(row) for _, row in lines) > MOST_FIELDS:
         raise _too_large(path, what, len(lines))
     others = f"; {len(sheets) - 1} more not read" if len(sheets) > 1 else ""
     note = f"{path.name}: sheet {sheets[0]!r} of a workbook{others}"

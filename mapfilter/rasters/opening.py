@@ -173,6 +173,9 @@ def _listed(folder: Path) -> list[Path]:
         expected = f"raster files ({', '.join(FORMATS)}) or an index of them"
         others = sorted(path.name for path in folder.iterdir() if path.is_file())
         hint = f"gdal_translate FROM TO.tif converts others, such as {others[0]}" if others else ""
+        if inside := sorted(one.name for one in folder.iterdir() if is_raster_folder(one)):
+            hint = f"they are in folders in it ({listed(inside)}): name one, or move all into one, "
+            hint += "as for the carriers of a network"
         raise fail(InputError, str(folder), expected, "none in this folder", hint)
     if len(found) > _MOST_FILES:
         raise fail(InputError, str(folder), f"at most {_MOST_FILES} rasters", len(found))

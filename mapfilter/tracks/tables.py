@@ -108,11 +108,25 @@ def _check_columns(table: str, given: pd.DataFrame, found: TableFaults) -> tuple
     lacking = [c.name for c in SCHEMA[table] if c.required and c.name not in given.columns]
     placed = ["east_m", "north_m"]
     if table in ("gnss", "truth") and set(placed) <= set(lacking):
-        found.add("", "columns east_m and north_m, or lat_deg and lon_deg", "neither")
+        expected = "columns east_m and north_m, or lat_deg and lon_deg"
+        found.add("", expected, "neither", _likely_place(given))
         lacking = [name for name in lacking if name not in placed]
     for name in lacking:
         found.add("", f"a column {name}", "none")
     return tuple(notes)
+
+
+def _likely_place(given: pd.DataFrame) -> str:
+    """Return what columns without the usual names of positions most likely are; "" for unknown."""
+    names = {str(name).lower() for name in given.columns}
+    for lat, lon in (("latitude", "longitude"), ("lat", "lon"), ("lat", "lng"), ("lat", "long")):
+        if {lat, lon} <= names:
+            return f"{lat} and {lon}; call them lat_deg and lon_deg"
+    if {"x", "y"} <= names:
+        return "x and y; call them east_m and north_m if they are metres in the CRS of the log"
+    if "geometry" in names:
+        return "points; give east_m and north_m, their x and y in the CRS of the log"
+    return ""
 
 
 def _technologies(stated: pd.Series, found: TableFaults) -> pd.Series:

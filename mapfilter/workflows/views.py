@@ -150,6 +150,8 @@ def pages_of(paths: Sequence[Path]) -> list[Path]:
             expected = f"a result with {REPLAY_HTML}, or a database"
             what = "a folder without any" if path.is_dir() else "nothing there"
             hint = "run mapfilter replay with --html"
+            if (path / BOUND_TIF).is_file():
+                hint = "a result of mapfilter bound: name its database beside it"
             faults.add(shown(str(path)), expected, what, hint)
         found += pages
     faults.raise_if_any(InputError)

@@ -72,6 +72,8 @@ def test_a_missing_database(tmp_path):
     (tmp_path / "out" / "manifest.json").touch()
     with pytest.raises(StoreError, match=rf"the database is {tmp_path / 'out'}\)"):
         open_database(tmp_path)
+    with pytest.raises(StoreError, match=rf"a part of the database {tmp_path / 'out'}\)"):
+        open_database(tmp_path / "out" / "manifest.json")
     (tmp_path / "file").touch()
     with pytest.raises(StoreError, match="a file"):
         open_database(tmp_path / "file")

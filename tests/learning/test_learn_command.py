@@ -190,7 +190,9 @@ def write(folder, log):
 
 def test_logs_whose_crs_puts_them_elsewhere_are_refused(faulty, tmp_path):
     logs = write(tmp_path / "logs", log_of(plan_of(), np.random.default_rng(0), crs="EPSG:32633"))
-    with pytest.raises(InputError, match="likely: log of another area or zone"):
+    with pytest.raises(
+        InputError, match="a wrong CRS: EPSG:32633 is stated for metres of EPSG:32632"
+    ):
         run_learn(configured(faulty[0], logs), tmp_path / "out")
     assert not (tmp_path / "out" / "patch.toml").exists()
 

@@ -35,6 +35,10 @@ def test_other_names_and_files_are_refused(track, tmp_path):
         mf.write_estimate(track, tmp_path / "track.csv")
     with pytest.raises(StoreError, match="expected a readable file"):
         mf.read_estimate(tmp_path / "none.parquet")
+    (tmp_path / "replay").mkdir()
+    mf.write_estimate(track, tmp_path / "replay" / "estimate.parquet")
+    with pytest.raises(mf.MapfilterError, match=r"found a folder \(likely: name the file: .*quet"):
+        mf.read_estimate(tmp_path)
 
 
 def test_logs_and_scores_are_equal_where_all_they_hold_is(track):

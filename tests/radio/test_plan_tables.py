@@ -144,7 +144,7 @@ def test_power_and_gain_are_named_where_there_is_no_eirp(tmp_path):
     [
         (
             pd.DataFrame({"id": ["a"]}),
-            "DataFrame (likely: a table; read_cell_plan reads a CSV of it)",
+            "DataFrame (likely: a table; read_cell_plan reads it)",
         ),
         (["a"], "'a'"),
         (None, "None"),

@@ -85,6 +85,14 @@ def test_a_file_without_anything_in_it_is_no_raster(tmp_path):
     assert len(faults(tmp_path, "level")) == 3
 
 
+def test_rasters_in_folders_of_bands_are_named(tmp_path):
+    for band in ("L800", "L1800"):
+        (tmp_path / band).mkdir()
+        (tmp_path / band / "A.asc").write_text("a grid")
+    with pytest.raises(InputError, match=r"they are in folders in it \(L1800, L800\): name one"):
+        open_rasters(tmp_path, "level")
+
+
 QUANTITIES = [
     (None, [("", "dBm"), ("", "dBm")], "level"),
     (None, [("loss", ""), ("", "dB")], "loss"),

@@ -423,6 +423,18 @@ def test_seconds_of_the_gps_week_that_speeds_contradict(late_s):
     assert note == f"+{WEEK_S + late_s:.1f} s, {by}"
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_speeds_over_a_pause_of_a_receiver_are_not_compared(seed):
+    """Those between the ends of the gap told against the right shift: 0.5 instead of 0.99."""
+    rng = np.random.default_rng(seed)
+    time_s = np.arange(900.0)
+    speed = np.interp(time_s / 20, np.arange(47.0), rng.uniform(0, 16, 47))
+    heard = (time_s < 250) | (time_s >= 600)
+    shift_s, correlation = _by_speed((time_s[heard] + 1e6, speed[heard]), (time_s + 55, speed))
+    assert shift_s == pytest.approx(1e6 - 55, abs=0.2)
+    assert correlation > 0.99
+
+
 def test_a_clock_from_an_unknown_start_by_speeds():
     first = drive(LOCAL, 5_000.0, np.arange(400.0), "a.csv")
     shift_s, note = _offset(drive(UNKNOWN, 0.0, np.arange(100.0, 250.0)), first, 0.0)

@@ -18,7 +18,7 @@ WEEKS_S = 1024 * 7 * 86_400
 def notes(tmp_path):
     """Notes on a drive of uneven speed, with fixes of 3 m and a clock of its odometry."""
 
-    def of(shift_s, *, steady=False, seed=1, fixes_s=COUNT):
+    def of(shift_s, *, steady=False, seed=1, fixes_s=COUNT, jammed_s=(0, 0)):
         rng = np.random.default_rng(seed)
         knots = rng.uniform(0, 16, COUNT // 20 + 2)
         speed = np.full(COUNT, 10.0) if steady else np.interp(np.arange(COUNT) / 20, *_at(knots))
@@ -34,7 +34,8 @@ def notes(tmp_path):
             ("odometry.csv", TIME_S + shift_s, odometry),
         ):
             table = pd.DataFrame({"time": times, **rows})
-            table = table[: fixes_s if name == "fixes.csv" else COUNT]
+            if name == "fixes.csv":
+                table = table[:fixes_s].drop(index=range(*jammed_s))
             table.to_csv(tmp_path / name, index=False)
         found = mf.read_log([tmp_path / "fixes.csv", tmp_path / "odometry.csv"]).notes
         return [note for note in found if "speeds agree" in note]
@@ -63,6 +64,15 @@ def test_so_is_one_where_positions_end_early(notes, shift_s, seed):
     (note,) = notes(shift_s, seed=seed, fixes_s=220)
     assert float(note.partition(" best ")[2].split()[0]) == pytest.approx(-shift_s, abs=1.0)
     assert notes(0.0, seed=seed, fixes_s=220) == []
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("shift_s", [18.0, -7.0])
+def test_so_is_one_where_positions_pause(notes, shift_s, seed):
+    """Speeds within the gap were those of its ends, and agreed at no shift."""
+    (note,) = notes(shift_s, seed=seed, jammed_s=(250, 600))
+    assert float(note.partition(" best ")[2].split()[0]) == pytest.approx(-shift_s, abs=1.0)
+    assert notes(0.0, seed=seed, jammed_s=(250, 600)) == []
 
 
 def test_the_best_shift_leaves_three_minutes_in_common():

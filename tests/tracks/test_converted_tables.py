@@ -42,6 +42,23 @@ PX4 = {
     "vel_m_s": SPEED,
     "cog_rad": np.radians(COURSE),
 }
+PX4_IN_DEGREES = {
+    **{name: PX4[name] for name in ("timestamp", "time_utc_usec", "eph", "fix_type", "vel_m_s")},
+    "latitude_deg": LAT,
+    "longitude_deg": LON,
+    "altitude_msl_m": 16.0,
+}
+GPSLOGGER = {
+    "time": UTC.strftime("%Y-%m-%dT%H:%M:%SZ"),
+    "lat": LAT,
+    "lon": LON,
+    "elevation": 16.0,
+    "accuracy": 1.2,
+    "bearing": COURSE,
+    "speed": SPEED,
+    "ageofdgpsdata": np.nan,
+    "dgpsid": np.nan,
+}
 NAV_PVT = {
     "iTOW": 1000 * (np.arange(COUNT) + 5),
     "year": UTC.year,
@@ -79,6 +96,8 @@ TABLES = {
     "weeks": ARDUPILOT_OF_WEEKS,
     "ardupilot": ARDUPILOT,
     "px4": PX4,
+    "px4-degrees": PX4_IN_DEGREES,
+    "gpslogger": GPSLOGGER,
     "nav-pvt": NAV_PVT,
     "bag": BAG,
     "watch": WATCH,
@@ -103,9 +122,9 @@ def test_positions_are_read_by_the_names_of_the_program(tmp_path, program):
     np.testing.assert_allclose(places["altitude_m"], 16.0)
     if program != "bag":
         np.testing.assert_allclose(places["speed_mps"], SPEED, atol=1e-3)
-    if program in ("weeks", "ardupilot", "nav-pvt"):
+    if program in ("weeks", "ardupilot", "nav-pvt", "gpslogger"):
         np.testing.assert_allclose(places["course_deg"], COURSE)
-    if program in ("px4", "nav-pvt"):
+    if program in ("px4", "px4-degrees", "nav-pvt", "gpslogger"):
         np.testing.assert_allclose(places["accuracy_m"], 1.2)
 
 

@@ -243,6 +243,15 @@ def test_networks_in_one_number_of_four_digits(read):
     assert radio["cell"].unique().tolist() == ["262-1-7-8", "310-410-7-8"]
 
 
+@pytest.mark.parametrize(
+    ("network", "cell"), [("244-91", "244-91"), ("310/410", "310-410"), ("262 1", "262-1")]
+)
+def test_networks_in_one_text_beside_areas_of_two_technologies(read, network, cell):
+    """Cells had no network, and no area."""
+    radio, _ = read(**{"MCC-MNC": network, "LAC/TAC": 7, "Cell ID": 8})
+    assert radio["cell"].unique().tolist() == [f"{cell}-7-8"]
+
+
 def test_small_numbers_of_cells_beside_those_of_nodes(read, monkeypatch):
     """They were names, and those of all nodes the same ones."""
     nodes, cells = 4571 + np.arange(COUNT) // 20, 1 + np.arange(COUNT) % 3

@@ -151,3 +151,18 @@ def test_degrees_of_few_decimals_have_their_error(decimals, sd_m):
     # A few rows may be round by chance, and a place that was stated once is no receiver's.
     assert make_log(CRS, gnss=rows.iloc[:9]).notes == ()
     assert make_log(CRS, gnss=rows.assign(lat_deg=50.0, lon_deg=14.0)).notes == ()
+
+
+@pytest.mark.parametrize(
+    ("columns", "hint"),
+    [
+        (["Latitude", "Longitude"], "latitude and longitude; call them lat_deg and lon_deg"),
+        (["lat", "lng"], "lat and lng; call them lat_deg and lon_deg"),
+        (["x", "y"], "x and y; call them east_m and north_m if they are metres"),
+        (["geometry"], "points; give east_m and north_m, their x and y"),
+    ],
+)
+def test_positions_by_other_names_are_told_what_they_are_called(columns, hint):
+    with pytest.raises(InputError) as caught:
+        make_log("EPSG:32635", truth=pd.DataFrame({name: [0.0] for name in ("time_s", *columns)}))
+    assert hint in str(caught.value)

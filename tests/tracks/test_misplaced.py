@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mapfilter.errors import Faults
-from mapfilter.geodesy import project
+from mapfilter.geodesy import project, unproject
 from mapfilter.lattice import Lattice
 from mapfilter.tracks.checks.misplaced import check_near, degrees_for_metres, misplaced_by
 
@@ -46,6 +46,19 @@ def test_a_mistake_that_brings_positions_much_nearer_is_named(lon_deg, lat_deg, 
     east_m, north_m = project(CRS, [lon_deg], [lat_deg])
     assert misplaced_by(east_m, north_m, LYON) == cause
     assert degrees_for_metres(east_m, north_m, LYON) == ""
+
+
+@pytest.mark.parametrize(
+    ("stated", "named"), [("EPSG:32633", "EPSG:32633"), ("EPSG:25829", "EPSG:32629")]
+)
+def test_metres_of_another_zone_than_the_stated_one_are_named(stated, named):
+    """They were those of a log of another area."""
+    west_m, south_m, east_m, north_m = LYON.bounds_m
+    lon_deg, lat_deg = unproject(stated, (west_m + east_m) / 2, (south_m + north_m) / 2)
+    wrong = project(CRS, [lon_deg], [lat_deg])
+    assert misplaced_by(*wrong, LYON) == f"a wrong CRS: {named} is stated for metres of {CRS}"
+    elsewhere = project(CRS, [lon_deg], [lat_deg + 0.2])
+    assert misplaced_by(*elsewhere, LYON) == ""
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e6, 1e7])

@@ -147,6 +147,8 @@ def test_a_table_states_its_crs_as_long_as_it_holds_its_places():
     assert crs_stated(rows) == crs_stated(rows.iloc[1:3]) == OWN
     assert "crs" not in walk().attrs
     assert crs_stated(walk()) == ""
+    # Of a way of one part its bounds decide.
+    rows = placed_in(OWN, walk().iloc[:2])
     low, high = rows.min(), rows.max()
     for name in ("east_m", "north_m"):
         for edge, sign in ((low, -1), (high, 1)):

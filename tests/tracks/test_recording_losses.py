@@ -64,9 +64,11 @@ def test_a_column_of_levels_in_another_unit_is_refused(level, hint, walk, read):
     assert hint in told
 
 
-def test_levels_with_their_unit_in_each_field_are_refused(walk, read):
-    with pytest.raises(InputError, match=r"numbers, found 200 of 200 .* '-60 dBm' .*a unit in"):
-        read(walk.assign(level_dbm=[f"{level} dBm" for level in walk["level_dbm"]]))
+def test_levels_with_a_unit_of_no_level_in_each_field_are_refused(walk, read):
+    with pytest.raises(InputError, match=r"numbers, found 200 of 200 .* '-60 dB' .*a unit in"):
+        read(walk.assign(level_dbm=[f"{level} dB" for level in walk["level_dbm"]]))
+    log = read(walk.assign(level_dbm=[f"{level} dBm" for level in walk["level_dbm"]]))
+    assert log.radio["level_dbm"].tolist() == read(walk).radio["level_dbm"].tolist()
 
 
 @pytest.mark.parametrize("column", ["heading_rad", "turn_rad"])

@@ -36,6 +36,7 @@ ROWS = {
     "rinex-obs/2": {"satellites": 2 * COUNT},
     "rinex-nav": {"ephemerides": 2},
     "rinex-nav/3": {"ephemerides": 3, "ionosphere": 1},
+    "rtklib": {"positions": COUNT},
     "smartloc": {"truth": COUNT, "odometry": COUNT, "satellites": 2 * COUNT},
     "smartloc-raw": {"truth": COUNT, "satellites": 2 * COUNT},
     "indoor": {

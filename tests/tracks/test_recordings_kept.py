@@ -109,13 +109,13 @@ def test_marks_of_several_kinds_are_no_levels(drive):
 
 
 def test_units_beside_words_are_refused(drive):
-    levels = np.where(ROW % 3, [f"{level} dBm" for level in RECEIVED], "unknown")
-    with pytest.raises(InputError, match=r"found 40 of 40 values .* '-61 dBm' .*unit in each"):
+    levels = np.where(ROW % 3, [f"{level} dB" for level in RECEIVED], "unknown")
+    with pytest.raises(InputError, match=r"found 40 of 40 values .* '-61 dB' .*unit in each"):
         drive(level_dbm=levels)
 
 
 def test_where_a_file_is_cut_into_parts_does_not_matter(drive, monkeypatch):
-    levels = np.where(ROW < 20, [f"{level} dBm" for level in RECEIVED], RECEIVED)
+    levels = np.where(ROW < 20, [f"{level} dB" for level in RECEIVED], RECEIVED)
     levels[32:] = "NaN"
     for part_bytes in (1 << 24, 700):
         monkeypatch.setattr("mapfilter.tracks.readers.texts.text._PART_BYTES", part_bytes)
@@ -239,3 +239,14 @@ def test_of_a_large_table_read_in_parts_the_end_is_cut(copied, cut, monkeypatch)
     found, notes = copied(b"1777629630,24.9300030,60" + cut)
     assert found == 30 + bool(cut)
     assert [note.endswith("without a line end) (line 32)") for note in notes] == [True] * (not cut)
+
+
+def test_units_behind_values_do_not_depend_on_the_parts_of_a_file(drive, monkeypatch):
+    levels = np.where(ROW < 20, [f"{level} dBm" for level in RECEIVED], RECEIVED)
+    for part_bytes in (1 << 24, 700):
+        monkeypatch.setattr("mapfilter.tracks.readers.texts.text._PART_BYTES", part_bytes)
+        found = drive(level_dbm=levels).tables["radio"]["level_dbm"]
+        assert found.tolist() == RECEIVED.tolist()
+        turned = drive(level_dbm=levels[::-1])
+        assert turned.tables["radio"]["level_dbm"].notna().sum() == 40
+        assert "level_dbm: 20 values are no numbers" in " ".join(turned.ignored)

@@ -115,7 +115,11 @@ def test_columns_whose_names_only_end_in_a_usual_one_are_proposed(tmp_path, head
 @pytest.mark.parametrize(
     ("name", "text", "hint"),
     [
-        ("drive.pos", "% program   : RTKPOST ver.2.4.3\n% GPST  latitude(deg)\n", "RTKLIB"),
+        ("drive.pos", "2026/05/01 10:00:00.000   60.17   24.94   20.1   5   9\n", "RTKLIB"),
+        ("flight.ulg", "ULog", "ulog2csv"),
+        ("drive.bag", "#ROSBAG V2.0\n", "rostopic echo -b BAG -p TOPIC"),
+        ("flight.log", "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name\n", "mavlogdump.py, types GPS"),
+        ("novatel.txt", "#BESTPOSA,COM1,0,83.5,FINESTEERING,2416,468000.000\n", "NovAtel"),
         (
             "walk.csv",
             "Type,Local Number,Message,Field 1,Value 1,Units 1\nData,0,record,timestamp,1,s\n",

@@ -7,7 +7,6 @@ import pytest
 from mapfilter.errors import InputError
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
-from mapfilter.tracks.readers.recorded.recording import Clock
 
 TIME_S = np.arange(0.0, 20.0, 0.5)
 SPEED_MPS = 8.0 + np.sin(TIME_S)
@@ -242,8 +241,36 @@ def test_an_export_of_a_cars_diagnosis_is_read(tmp_path):
     found = read_recording(path)
     np.testing.assert_allclose(found.tables["odometry"]["speed_mps"], 10.0)
     np.testing.assert_allclose(found.tables["positions"]["speed_mps"], 10.0)
-    # Of the two times that with a zone is UTC.
-    assert found.clock == Clock("utc")
+    assert found.unread == ("device time", "g(x)")
+    assert found.clock.kind == "utc"
     start_s = pd.Timestamp("2026-05-28T20:26:40Z").timestamp()
     assert found.tables["positions"]["time_s"].tolist() == [start_s + k for k in range(9)]
-    assert found.unread == ("device time", "g(x)")
+
+
+def test_units_behind_values_are_those_of_a_header(tmp_path):
+    """Levels were refused, and speeds not read."""
+    rows = [
+        f"{1_778_666_400 + i},60.17,24.94,7,8,{-90 - i % 3} dBm,18 km/h,{i} m" for i in range(9)
+    ]
+    path = tmp_path / "phone.csv"
+    path.write_text("\n".join(["time,lat,lon,lac,ci,rsrp,Speed,Altitude", *rows]) + "\n")
+    found = read_recording(path)
+    assert found.tables["radio"]["level_dbm"].tolist() == [-90 - i % 3 for i in range(9)]
+    assert found.tables["positions"]["speed_mps"].to_numpy() == pytest.approx(5.0)
+    assert found.tables["positions"]["altitude_m"].tolist() == list(range(9))
+    assert "rsrp: dbm behind its values" in found.notes
+    assert "taken as missing" not in " ".join(found.notes)
+
+
+@pytest.mark.parametrize(("last", "count"), [("-90", 4), ("-90 km/h", 3), ("-90 dB", 3)])
+def test_values_with_another_unit_than_the_first_are_none(tmp_path, last, count):
+    path = tmp_path / "phone.csv"
+    path.write_text(f"time,ci,rsrp\n1,8,-90 dBm\n2,8,-91 dBm\n3,8,-92dBm\n4,8,{last}\n")
+    assert read_recording(path).tables["radio"]["level_dbm"].notna().sum() == count
+
+
+def test_a_unit_that_contradicts_the_header_is_none(tmp_path):
+    path = tmp_path / "drive.csv"
+    path.write_text("time,wheel speed (km/h)\n1,9 m/s\n2,8 m/s\n3,7 m/s\n")
+    with pytest.raises(InputError, match="3 values are no numbers"):
+        read_recording(path)

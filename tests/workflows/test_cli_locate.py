@@ -108,6 +108,16 @@ def test_without_truth_there_is_no_score_and_no_picture(folder, tmp_path):
     assert not (tmp_path / "errors.png").exists()
 
 
+def test_a_log_without_reports_says_so(folder, tmp_path):
+    """What followed the colon was empty."""
+    motion = pd.DataFrame({"time_s": np.arange(9.0), "step_m": 1.0, "heading_rad": 0.0})
+    write_log(make_log(CRS, motion=motion), tmp_path / "log")
+    given = ("--db", folder / "surveys", "--log", tmp_path / "log", "--out", tmp_path / "out")
+    outcome = mapfilter("locate", *given)
+    assert outcome.code == 3
+    assert "nothing is located: the log has no report of a cell" in outcome.err
+
+
 def test_a_picture_of_an_older_run_does_not_stay(folder, tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
     given = ["--db", folder / "surveys", "--out", tmp_path, "--method", "centroid", "--json"]

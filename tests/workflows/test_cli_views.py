@@ -147,6 +147,10 @@ def test_what_cannot_be_shown_is_named(world, tmp_path):
     refused = mapfilter("view", world.journeys, tmp_path / "none", "--out", tmp_path / "v.html")
     assert_refused(refused, "run mapfilter replay with --html", "nothing there")
     assert not (tmp_path / "v.html").exists()
+    (tmp_path / "bound").mkdir()
+    (tmp_path / "bound" / "bound.tif").touch()
+    refused = mapfilter("view", tmp_path / "bound", "--out", tmp_path / "v.html")
+    assert_refused(refused, "a result of mapfilter bound: name its database beside it")
     broken = tmp_path / "broken.html"
     broken.write_text("<html>")
     assert_refused(mapfilter("view", broken, "--out", tmp_path / "v.html"), "no bundle in it")

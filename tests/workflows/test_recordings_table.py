@@ -47,6 +47,7 @@ FILES = {
     "brdc.16n": text("rinex-nav"),
     "brdc.23n": text("rinex-nav"),
     "phone.23o": text("rinex-obs"),
+    "rover.pos": text("rtklib"),
     "Input.txt": text("smartloc"),
     "GT.txt": points(text("smartloc")),
     "RXM-RAWX.csv": text("smartloc-raw"),

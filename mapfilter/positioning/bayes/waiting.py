@@ -47,7 +47,9 @@ def _may_wait(beliefs: BeliefFilters, state: BayesState, usable: UsableEpoch) ->
     """Return whether beliefs may wait, unless a report of the epoch is due."""
     if not isinstance(state.belief, ParticleBelief) or state.contested:
         return False
-    if state.status in _JUDGED_ANEW:
+    known = state.reported
+    if state.status in _JUDGED_ANEW or (known is not None and known.belief is not state.belief):
+        # The status is not judged yet, or not of this belief.
         return False
     if usable.motion is not Reason.USED or _measures(usable.epoch):
         return False

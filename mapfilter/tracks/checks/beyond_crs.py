@@ -122,7 +122,7 @@ def within_crs(
             else:
                 continue
             beyond = project_within(crs, lon_deg, lat_deg)[2]
-            note = without_beyond(recording.path.name, crs, lon_deg, lat_deg, beyond, faults)
+            note = without_beyond(recording.name, crs, lon_deg, lat_deg, beyond, faults)
             if note:
                 notes.append(note)
                 tables[name] = rows[~beyond].reset_index(drop=True)

@@ -14,7 +14,7 @@ _APART_S = HOUR_S
 
 def zoneless_note(recordings: Sequence[Recording]) -> list[str]:
     """Return a note on recordings whose local times nothing turns into UTC."""
-    names = [one.path.name for one in recordings if one.clock.kind == "local"]
+    names = [one.name for one in recordings if one.clock.kind == "local"]
     if not names:
         return []
     same = ", taken for one zone" if len(names) > 1 else ""

@@ -67,18 +67,18 @@ def check_columns(recording: Recording) -> tuple[str, ...]:
             faults.add(where, "m/s and rad/s of a vehicle that its tyres hold", got, hint)
         elif table == "odometry" and (fast := _fast_mps(along)):
             notes.append(
-                f"{recording.path.name}: odometry, speed_mps: {fast:.0f} m/s or more in 5 % of the "
+                f"{recording.name}: odometry, speed_mps: {fast:.0f} m/s or more in 5 % of the "
                 "rows (likely: km/h for m/s, --column wheel_speed_kmh=COLUMN)"
             )
         elif table == "odometry" and _unsigned(turn):
             notes.append(
-                f"{recording.path.name}: odometry, yaw_rate_radps: all of one sign (likely: their "
+                f"{recording.name}: odometry, yaw_rate_radps: all of one sign (likely: their "
                 "sign is lost, or turns to one side alone)"
             )
         elif share := _negative_share(along):
             what = "another quantity, such as an acceleration or a rate of turning"
             notes.append(
-                f"{recording.path.name}: {table}, {names[0]}: {share:.0%} negative, now and then "
+                f"{recording.name}: {table}, {names[0]}: {share:.0%} negative, now and then "
                 f"(likely: {what})"
             )
     if (steps := recording.tables.get("steps")) is not None:

@@ -38,7 +38,7 @@ def check_far_apart(recordings: Sequence[Recording]) -> None:
             undone = rows.assign(lon_deg=lon_sign * rows[lon], lat_deg=lat_sign * rows[lat])
             if _apart_m(reference, undone) <= min(FAR_M, apart_m / _TIMES):
                 here, there = _middle(rows), _middle(reference)
-                expected = f"positions of one journey, near {there} ({first.path.name})"
+                expected = f"positions of one journey, near {there} ({first.name})"
                 got = f"{here}, {apart_m / 1000:.0f} km off"
                 hint = f"{mistake} in one of the two"
                 faults.add(f"{other.path}, latitude and longitude", expected, got, hint)

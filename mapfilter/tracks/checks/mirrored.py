@@ -49,7 +49,7 @@ def mirrored_notes(recordings: Sequence[Recording], moved: Moved) -> list[str]:
         if cause := mirrored_by(motion, rows):
             other = ", or azimuths that run counter-clockwise" if moved.compass else ""
             text = f"{MIRRORED} {by}: {cause}{other}?"
-            found.append(f"{recording.path.name}: {text}")
+            found.append(f"{recording.name}: {text}")
     return found
 
 

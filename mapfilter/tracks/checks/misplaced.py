@@ -9,7 +9,7 @@ from pyproj.exceptions import ProjError
 
 from mapfilter._types import Floats
 from mapfilter.errors import Faults
-from mapfilter.geodesy import project, unproject
+from mapfilter.geodesy import project, same_grid, short_crs, unproject, utm_crs
 from mapfilter.lattice import Lattice, outside_m
 
 AWAY_M = 5000.0
@@ -111,6 +111,7 @@ def _undone(crs: str, east_m: Floats, north_m: Floats) -> Iterator[tuple[str, Fl
     yield "east and north swapped", north_m, east_m
     yield from _from_degrees(crs, east_m, north_m)
     lon_deg, lat_deg = unproject(crs, east_m, north_m)
+    yield from _of_another_zone(crs, lon_deg, lat_deg)
     yield "latitude and longitude swapped", *_in_crs(crs, lat_deg, lon_deg)
     for names, lon, lat in (
         ("longitude", -lon_deg, lat_deg),
@@ -121,6 +122,22 @@ def _undone(crs: str, east_m: Floats, north_m: Floats) -> Iterator[tuple[str, Fl
     swapped = "latitude and longitude swapped, with a lost sign"
     for east, north in ((1, -1), (-1, 1), (-1, -1)):
         yield swapped, *_in_crs(crs, east * lat_deg, north * lon_deg)
+
+
+def _of_another_zone(
+    crs: str, lon_deg: Floats, lat_deg: Floats
+) -> Iterator[tuple[str, Floats, Floats]]:
+    """Yield metres of positions in the UTM zone of their place, taken for those of a CRS.
+
+    Metres of a log that states another zone than theirs lie in that zone.
+    """
+    known = np.isfinite(lon_deg) & np.isfinite(lat_deg)
+    if not known.any():
+        return
+    zone = utm_crs(float(np.median(lon_deg[known])), float(np.median(lat_deg[known])))
+    if not same_grid(zone, crs):
+        mistake = f"a wrong CRS: {zone} is stated for metres of {short_crs(crs)}"
+        yield mistake, *_in_crs(zone, lon_deg, lat_deg)
 
 
 def _from_degrees(

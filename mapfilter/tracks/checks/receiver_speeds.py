@@ -49,7 +49,7 @@ def check_speeds(recording: Recording, east_m: Floats, north_m: Floats) -> tuple
     fault = speed_unit_fault(known["time_s"], known["speed_mps"], places)
     if fault is None:
         return ()
-    return (f"{recording.path.name}: positions, speed_mps: {fault.found}; expected m/s",)
+    return (f"{recording.name}: positions, speed_mps: {fault.found}; expected m/s",)
 
 
 def speed_unit_fault(

@@ -9,7 +9,9 @@ import pandas as pd
 
 from mapfilter._types import Bools, Complexes, Floats, Ints
 
-_USUAL_M, _SHORTEST_M, _LONGEST_M = 40.0, 25.0, 300.0
+USUAL_M = 40.0
+_SHORTEST, _LONGEST_M = 0.625, 300.0
+"""Shortest line as a share of the usual one, and the longest."""
 _COVERED = 0.6
 _LONGEST_TIMES = 5.0
 _FINEST, _COARSEST, _FEWER = 4096, 6, 1.4
@@ -132,7 +134,9 @@ def known_places(places: pd.DataFrame) -> tuple[Floats, Floats, Floats]:
     return time_s, table[first, 1], table[first, 2]
 
 
-def stretches(places: pd.DataFrame, time_s: Floats, way_m: Floats) -> Stretches | None:
+def stretches(
+    places: pd.DataFrame, time_s: Floats, way_m: Floats, usual_m: float = USUAL_M
+) -> Stretches | None:
     """Return pairs of lines of some 40 m and more between positions; None where there are too few.
 
     The way is parted equally, as finely as it may be with lines of 40 m or more on most of it but
@@ -146,6 +150,8 @@ def stretches(places: pd.DataFrame, time_s: Floats, way_m: Floats) -> Stretches 
         time_s, east_m and north_m.
     time_s, way_m : (K,) array
         Of motion: times, and the way until each. Positions before and after are left out.
+    usual_m : float
+        Another length than 40 m; lines of less than 0.625 of it are left out.
 
     Examples
     --------
@@ -174,8 +180,8 @@ def stretches(places: pd.DataFrame, time_s: Floats, way_m: Floats) -> Stretches 
         length_m = np.abs(line_m)
         is_gap = passed > _LONGEST_TIMES * np.median(passed)
         fits = (length_m <= _LONGEST_M) & ~is_gap
-        if passed[fits & (length_m >= _USUAL_M)].sum() >= _COVERED * passed[~is_gap].sum():
-            fits &= length_m >= _SHORTEST_M
+        if passed[fits & (length_m >= usual_m)].sum() >= _COVERED * passed[~is_gap].sum():
+            fits &= length_m >= _SHORTEST * usual_m
             first = np.flatnonzero(fits[:-1] & fits[1:])
             return Stretches(at_s, group, first, line_m[first], line_m[first + 1])
         parts /= _FEWER

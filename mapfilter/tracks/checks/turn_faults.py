@@ -9,6 +9,7 @@ from mapfilter._types import Bools, Floats, Ints
 from mapfilter.angles import wrap_rad
 from mapfilter.tracks.checks.motion_fault import MotionFault
 from mapfilter.tracks.checks.stretches import (
+    USUAL_M,
     Stretches,
     motion_values,
     reckoned_m,
@@ -23,6 +24,8 @@ _CORNER_RAD, _LEAST_RAD = np.deg2rad(30.0), np.deg2rad(20.0)
 _AGREED_RAD, _STRAIGHT_RAD = np.deg2rad(30.0), np.deg2rad(20.0)
 _FEWEST_CORNERS, _BOTH, _AGREED, _LEAST_GAIN = 3, 2 / 3, 0.85, 0.25
 _A_SECOND = 1.2
+_OF_CURVES_M = 120.0
+"""Lines between which the curves of a fast road are corners."""
 _UNITS = {
     "degrees": np.pi / 180,
     "radians taken for degrees (rad/s for deg/s)": 180 / np.pi,
@@ -39,7 +42,8 @@ def turn_fault(motion: pd.DataFrame, places: pd.DataFrame) -> MotionFault | None
     Dead reckoning by the steps and turns has corners of its own, which are compared with those of
     the positions, between lines of some 50 m. Turns are wrong where corners of 30 to 150 degrees,
     three or more, contradict them and fit the same turns the other way round, or in another unit,
-    with which straight ways are straight, too.
+    with which straight ways are straight, too. Where curves are so wide that there are no such
+    corners, lines are of 150 m and more, and only the sense of turns is judged.
 
     Parameters
     ----------
@@ -65,18 +69,22 @@ or latitude and longitude of the positions are swapped (--factor turn_rad=-1 men
     if np.isfinite(turn_rad[1:]).sum() < _FEWEST:
         return None
     time_s, step_m = motion_values(motion, "time_s"), steady_values(motion, "step_m")
-    ways = stretches(places, time_s, np.cumsum(np.abs(step_m)))
-    if ways is None:
-        return None
-    ways = ways.with_known(time_s, turn_rad)
-    corners = ways.where(_is_corner(ways.turned_rad, _CORNER_RAD))
-    if _number(corners.first) < _FEWEST_CORNERS:
+    for usual_m in (USUAL_M, _OF_CURVES_M):
+        ways = stretches(places, time_s, np.cumsum(np.abs(step_m)), usual_m)
+        if ways is None:
+            return None
+        ways = ways.with_known(time_s, turn_rad)
+        corners = ways.where(_is_corner(ways.turned_rad, _CORNER_RAD))
+        if _number(corners.first) >= _FEWEST_CORNERS:
+            break
+    else:
         return None
     turn_rad = steady_values(motion, "turn_rad")
     lasted_s = np.diff(time_s, prepend=time_s[:1])
     apart_s = rows_apart_s(time_s)
-    units: dict[str, Floats | float] = {"": 1.0, **_UNITS}
-    if not 1 / _A_SECOND <= apart_s <= _A_SECOND:
+    # By long lines noise of turns resembles another unit of them.
+    units: dict[str, Floats | float] = {"": 1.0, **(_UNITS if usual_m == USUAL_M else {})}
+    if usual_m == USUAL_M and not 1 / _A_SECOND <= apart_s <= _A_SECOND:
         units[f"rates (rad/s) in rows {apart_s:.2g} s apart"] = lasted_s
         units[f"rates (degrees/s) in rows {apart_s:.2g} s apart"] = lasted_s * np.pi / 180
     agreed = {

@@ -24,6 +24,7 @@ from mapfilter.tracks.joining.position_shift import (
 from mapfilter.tracks.joining.position_units import metres_about_middle
 from mapfilter.tracks.joining.speed_shift import (
     best_shift,
+    measured,
     shift_note,
     speed_agreement,
     speeds_of_places,
@@ -77,14 +78,14 @@ def align(recordings: Sequence[Recording], given_s: Mapping[Path, float]) -> Ali
     for recording, dated_s in zip(recordings, early_s, strict=True):
         if recording.path in given_s:
             offsets.append(given_s[recording.path])
-            notes.append(f"{recording.path.name}: {given_s[recording.path]:+g} s, as given")
+            notes.append(f"{recording.name}: {given_s[recording.path]:+g} s, as given")
             continue
         offset_s, note = 0.0, ""
         if recording is not first:
             offset_s, note = _offset(recording, first, given_s.get(first.path, 0.0))
         offsets.append(dated_s + offset_s)
         if note:
-            notes.append(f"{recording.path.name}: {note}")
+            notes.append(f"{recording.name}: {note}")
     if not first.clock.absolute:
         notes += zoneless_note([one for one in recordings if one.path not in given_s])
     notes += apart_note(given, offsets)
@@ -114,13 +115,13 @@ def _offset(recording: Recording, given: Recording, late_s: float) -> tuple[floa
     same = clock.kind == first.clock.kind and clock.kind != "utc"
     if clock.absolute or (same and clock.kind == "local"):
         if one is None or other is None:
-            return 0.0, shift_note(first.path.name, _speed(first), _speed(recording))
-        return 0.0, _disagreement(first.path.name, one, other)
+            return 0.0, shift_note(first.name, _speed(first), _speed(recording))
+        return 0.0, _disagreement(first.name, one, other)
     if clock.kind == "local":
         return _zone(recording, first, one, other)
     if same and _common(recording, given) >= COMMON_SHARE:
         far = one is not None and other is not None and median_apart_m(one, other, 0.0, 0.1) > FAR_M
-        return 0.0, _disagreement(first.path.name, one, other) if far else ""
+        return 0.0, _disagreement(first.name, one, other) if far else ""
     if one is not None and other is not None:
         low, high = one[0][0] - other[0][-1], one[0][-1] - other[0][0]
         step_s = max(1.0, (high - low) / _MOST_SHIFTS)
@@ -135,9 +136,9 @@ def _offset(recording: Recording, given: Recording, late_s: float) -> tuple[floa
     shift, correlation = _by_speed(*speeds)
     if correlation >= _LEAST_CORRELATION:
         return shift, f"{shift:+.1f} s, by speeds (correlation {correlation:.2f})"
-    expected = f"positions or speeds in common with {first.path.name}"
+    expected = f"positions or speeds in common with {first.name}"
     got = f"times in {clock}, and none"
-    hint = f"--offset {recording.path.name}=SECONDS, the seconds to add to its times"
+    hint = f"--offset {recording.name}=SECONDS, the seconds to add to its times"
     hint += " (Unix time of its time 0)" if first.clock.absolute else ""
     raise fail(InputError, str(recording.path), expected, got, hint)
 
@@ -161,12 +162,12 @@ def _zone(
             shift_s = float(shifts[np.nanargmin(apart)])
             near = float(np.nanmin(apart))
             note = f"local time is UTC{_clock(-shift_s)} (by positions, median {near:.1f} m apart)"
-            fine = _disagreement(first.path.name, one, (other[0] + shift_s, *other[1:]))
+            fine = _disagreement(first.name, one, (other[0] + shift_s, *other[1:]))
             return shift_s, f"{note}; {fine}" if fine else note
     shifts = -_QUARTER_S * np.array(_ZONE_QUARTERS)
     common = np.array([_common(recording, first, shift) for shift in shifts])
     if common.max() <= 0:
-        expected = f"local times that overlap those of {first.path.name} in some zone"
+        expected = f"local times that overlap those of {first.name} in some zone"
         hint = "recordings of two journeys, or a wrong date; else give --zone or --offset"
         raise fail(InputError, str(recording.path), expected, "none", hint)
     found = best_shift(shifts[common > 0], _speed(first), _speed(recording))
@@ -250,25 +251,26 @@ def _by_speed(
     if not min(lengths) > 0:
         return 0.0, 0.0
     grids = [np.arange(0.0, length, 1 / _RATE_HZ) for length in lengths]
-    a, b = (
-        np.interp(grid + track[0][0], *track)
-        for grid, track in zip(grids, (one, other), strict=True)
+    at_s = [grid + time[0] for grid, (time, _) in zip(grids, (one, other), strict=True)]
+    # Speeds within the gap of a receiver that is jammed are unknown.
+    known_a, known_b = (
+        measured(track, at).astype(np.float64) for at, track in zip(at_s, (one, other), strict=True)
     )
+    a, b = known_a * np.interp(at_s[0], *one), known_b * np.interp(at_s[1], *other)
     size = 1 << int(np.ceil(np.log2(len(a) + len(b))))
 
     def lagged(x: Floats, y: Floats) -> Floats:
         product = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
         return np.concatenate([product[-(len(y) - 1) :], product[: len(x)]])
 
-    ones_a, ones_b = np.ones(len(a)), np.ones(len(b))
-    count = np.round(lagged(ones_a, ones_b))
-    sum_a, sum_b = lagged(a, ones_b), lagged(ones_a, b)
+    count = np.round(lagged(known_a, known_b))
+    sum_a, sum_b = lagged(a, known_b), lagged(known_a, b)
     with np.errstate(divide="ignore", invalid="ignore"):
         shared = lagged(a, b) - sum_a * sum_b / count
-        spread_a = lagged(a**2, ones_b) - sum_a**2 / count
-        spread_b = lagged(ones_a, b**2) - sum_b**2 / count
+        spread_a = lagged(a**2, known_b) - sum_a**2 / count
+        spread_b = lagged(known_a, b**2) - sum_b**2 / count
         correlation = shared / np.sqrt(np.maximum(spread_a * spread_b, 1e-12))
-    correlation[count < max(10, COMMON_SHARE * min(len(a), len(b)))] = -1.0
+    correlation[count < max(10, COMMON_SHARE * min(known_a.sum(), known_b.sum()))] = -1.0
     best = int(np.nanargmax(correlation))
     shift_s = (best - (len(b) - 1)) / _RATE_HZ + one[0][0] - other[0][0]
     return float(shift_s), float(min(correlation[best], 1.0))

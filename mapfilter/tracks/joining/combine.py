@@ -16,6 +16,7 @@ from mapfilter.tracks.checks.beyond_crs import within_crs
 from mapfilter.tracks.checks.far_apart import check_far_apart
 from mapfilter.tracks.checks.mirrored import mirrored_notes
 from mapfilter.tracks.checks.receiver_speeds import check_speeds
+from mapfilter.tracks.checks.two_phones import two_phones_notes
 from mapfilter.tracks.joining.alignment import Alignment, align
 from mapfilter.tracks.joining.equal_times import in_order
 from mapfilter.tracks.joining.frame import Frame
@@ -66,7 +67,7 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
     frame = Frame(shifted, options.crs, options.origin_deg, options.about_deg)
     shifted, beyond = within_crs(shifted, frame.crs, frame.local)
     notes = [*alignment.notes, *frame.notes, *beyond]
-    notes += [*_speed_notes(shifted, frame), *_list_notes(recordings)]
+    notes += [*_speed_notes(shifted, frame), *_list_notes(recordings), *two_phones_notes(shifted)]
     true_alone = set(options.truth) - set(options.measured)
     measured = [r for r in shifted if r.path not in true_alone]
     sensors = _sensors(measured, frame, options.truth, notes)
@@ -80,7 +81,7 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
         walk=options.walk,
         true=[r for r in shifted if r.path in true_alone],
     )
-    names = ", ".join(r.path.name for r in measured)
+    names = ", ".join(r.name for r in measured)
     rows, given_factors = scaled_motion(moved.rows, options.factors, names)
     moved = replace(moved, rows=rows)
     mirrored = mirrored_notes(shifted, moved)
@@ -130,7 +131,7 @@ def _journey(recordings: Sequence[Recording]) -> list[Recording]:
     journey = [r for r in recordings if set(r.tables) - _NO_JOURNEY]
     if journey:
         return journey
-    names = ", ".join(r.path.name for r in recordings)
+    names = ", ".join(r.name for r in recordings)
     orbits = any("ephemerides" in r.tables for r in recordings)
     got = "only orbits of satellites" if orbits else "only a list of cells"
     hint = "name them together with a recording of pseudoranges" if orbits else _CELLS_HINT
@@ -149,7 +150,7 @@ def _speed_notes(recordings: Sequence[Recording], frame: Frame) -> list[str]:
 
 def _list_notes(recordings: Sequence[Recording]) -> list[str]:
     """Return notes on lists of cells, which are no part of a journey."""
-    lists = [(r.path.name, len(r.tables["cells"])) for r in recordings if "cells" in r.tables]
+    lists = [(r.name, len(r.tables["cells"])) for r in recordings if "cells" in r.tables]
     return [f"{name}: a list of {number_of(n, 'cell')}; {_CELLS_HINT}" for name, n in lists]
 
 
@@ -180,7 +181,7 @@ def _without_mirrored_turns(log: TrackLog, *, compass: bool) -> TrackLog:
 
 
 def _nothing_found(recordings: Sequence[Recording], journey: Sequence[Recording]) -> MapfilterError:
-    names = ", ".join(r.path.name for r in recordings)
+    names = ", ".join(r.name for r in recordings)
     odometry = [r.tables["odometry"] for r in journey if "odometry" in r.tables]
     turns = any(rows["yaw_rate_radps"].notna().any() for rows in odometry)
     got = "yaw rates without speeds or an odometer" if turns else "none"
@@ -262,7 +263,7 @@ def _apart(recordings: Sequence[Recording], table: str, notes: list[str]) -> lis
         for other in kept:
             begin, end = other.tables[table]["time_s"].iloc[[0, -1]]
             if first < end and begin < last:
-                notes.append(f"{recording.path.name}: {table} not used, {other.path.name} has it")
+                notes.append(f"{recording.name}: {table} not used, {other.name} has it")
                 break
         else:
             kept.append(recording)

@@ -73,7 +73,7 @@ def drive_of(
     headed = by_compass(rows, convergence_rad)
     if has_headings(headed):
         unused = "yaw rates not used, the speeds have headings"
-        notes = tuple(f"{one.path.name}: {unused}" for one in turns)
+        notes = tuple(f"{one.name}: {unused}" for one in turns)
         moved, imu, words = reckon_headings(headed)
         azimuth_deg = rows.set_index("time_s")["compass_deg"]
         at_rows = azimuth_deg.reindex(moved["time_s"]).reset_index(drop=True)
@@ -84,7 +84,7 @@ def drive_of(
     if rows["yaw_rate_radps"].isna().all():
         turning = own_turning(wheels)
         if turning is not None:
-            notes = (*notes, f"{wheels.path.name}: turns are those from row to row")
+            notes = (*notes, f"{wheels.name}: turns are those from row to row")
         else:
             turning, of_phone = _turning_of_phone(wheels, rows, sensors, recordings)
             notes = (*notes, *of_phone)
@@ -110,7 +110,7 @@ def _turning_of_phone(
     if turning is None:
         return None, notes
     turning, late = _on_the_clock_of(wheels, rows, turning, sensors, recordings)
-    check_turning(rows, turning, ", ".join(r.path.name for r in recordings))
+    check_turning(rows, turning, ", ".join(r.name for r in recordings))
     return turning, (*notes, *late)
 
 
@@ -122,7 +122,7 @@ def _on_the_clock_of(
     recordings: Sequence[Recording],
 ) -> tuple[Turning, tuple[str, ...]]:
     """Return a phone's turns on the clock of a vehicle's speeds, and a note where it is another."""
-    phones = [r.path.name for r in recordings if "gyroscope" in r.tables and r is not wheels]
+    phones = [r.name for r in recordings if "gyroscope" in r.tables and r is not wheels]
     force = samples(sensors, "accelerometer", AXES) or samples(sensors, "linear_acceleration", AXES)
     speed = rows.dropna(subset=["speed_mps"])
     if not phones or force is None or len(speed) < _FEWEST:
@@ -132,7 +132,7 @@ def _on_the_clock_of(
     if not shift_s:
         return turning, ()
     note = (
-        f"{listed(phones)}: accelerations agree with the speeds of {wheels.path.name} best "
+        f"{listed(phones)}: accelerations agree with the speeds of {wheels.name} best "
         f"{shift_s:+.1f} s shifted (explained: {best:.2f}, not {now:.2f}); its turns are shifted, "
         "--offset shifts all of it"
     )

@@ -57,7 +57,7 @@ class Frame:
             self.crs = projected_crs(_LOCAL.format(lat=lat, lon=lon))
             if origin_deg is None:
                 self.notes.append(
-                    f"{own[0].path.name}: metres in a frame of its own, placed at latitude 0 and "
+                    f"{own[0].name}: metres in a frame of its own, placed at latitude 0 and "
                     "longitude 0; see --origin and --crs"
                 )
         elif stated:
@@ -74,7 +74,7 @@ class Frame:
         if crs and not np.isfinite(self.lat_deg) and about_deg is not None:
             self.lat_deg, self.lon_deg = about_deg
         if own and places and origin_deg is None and not crs:
-            names = ", ".join(r.path.name for r in own)
+            names = ", ".join(r.name for r in own)
             expected = "one frame of positions"
             got = "degrees in one file, metres in a frame of its own in this one"
             raise fail(InputError, names, expected, got, "give --origin LAT,LON of the frame")

@@ -77,7 +77,7 @@ def early_dates(
         early_s.append(0.0 if found is None else found.late_s)
         if found is not None:
             notes.append(
-                f"{recording.path.name}: {found.late_s:+.0f} s, by the other files: {found.cause}"
+                f"{recording.name}: {found.late_s:+.0f} s, by the other files: {found.cause}"
             )
         else:
             notes += _doubtful_dates(recording, given_s)
@@ -165,11 +165,10 @@ def _doubtful_dates(recording: Recording, given: Collection[Path]) -> list[str]:
 def _doubt(recording: Recording, why: str, mistakes: Sequence[Misread]) -> str:
     begin_s, _ = span_s(recording)
     likely = ", or ".join(
-        f"{one.cause}: --offset {recording.path.name}={one.late_s:.0f} for "
-        f"{_day(begin_s + one.late_s)}"
+        f"{one.cause}: --offset {recording.name}={one.late_s:.0f} for {_day(begin_s + one.late_s)}"
         for one in mistakes
     )
-    return f"{recording.path.name}: times are {why}{f' (likely: {likely})' if likely else ''}"
+    return f"{recording.name}: times are {why}{f' (likely: {likely})' if likely else ''}"
 
 
 def _mistakes(begin_s: float) -> list[Misread]:

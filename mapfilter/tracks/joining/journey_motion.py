@@ -110,13 +110,13 @@ def _recorded(
         if name == "odometry":
             having, turns = parted_odometry(having)
             if turns and not having:
-                some = listed([one.path.name for one in turns])
+                some = listed([one.name for one in turns])
                 notes.append(f"{some}: yaw rates without speeds (wheel_speed_mps): no motion")
         if not having:
             continue
         for other in having[1:]:
-            notes.append(f"{other.path.name}: {name} not used, {having[0].path.name} has it, too")
-        rows, source = having[0].tables[name], f"motion is that of {having[0].path.name}"
+            notes.append(f"{other.name}: {name} not used, {having[0].name} has it, too")
+        rows, source = having[0].tables[name], f"motion is that of {having[0].name}"
         if name == "odometry":
             drive, words = drive_of(having[0], turns, sensors, frame.convergence_rad, recordings)
             notes += words
@@ -133,7 +133,7 @@ def _recorded(
         undirected = not any(known.notna().any() for known in directions)
         if undirected and (turning := own_turning(having[0])) is not None:
             of = "rows beside those of steps" if turning.source == "turns" else turning.source
-            notes.append(f"{having[0].path.name}: turns are those of {of}")
+            notes.append(f"{having[0].name}: turns are those of {of}")
             moved = moved.assign(turn_rad=turning.between(moved["time_s"].to_numpy(np.float64)))
         elif undirected:
             lacking = "no headings and no turns (a column compass_deg, heading_rad or turn_rad)"
@@ -204,7 +204,7 @@ def _course(
         told = "its positions, one to the next", "by their scatter about straight lines, with turns"
         notes.append(_receiver_note(recording, imu, *told))
         return Moved(motion, imu, source=OF_RECEIVER)
-    names = ", ".join(r.path.name for r in recordings)
+    names = ", ".join(r.name for r in recordings)
     expected = "positions, with speed and course or without"
     raise fail(InputError, names, expected, "none", "leave out --course-motion")
 
@@ -220,7 +220,7 @@ def _placed(recording: Recording) -> pd.DataFrame | None:
 
 def _receiver_note(recording: Recording, imu: ImuNoise | None, source: str, how: str) -> str:
     """Return what motion by a receiver is made of, and its errors."""
-    text = f"{recording.path.name}: motion comes from GNSS: {source}"
+    text = f"{recording.name}: motion comes from GNSS: {source}"
     if imu is not None:
         text += f"; steps ± {imu.sigma_trans_m:.2g} m, headings ± {imu.sigma_orient_deg:.0f} deg, "
         text += f"{how}"

@@ -16,7 +16,7 @@ _MOST_S = 1e10
 def offsets_by_path(
     offsets_s: Mapping[str, float], paths: Sequence[Path], where: str, faults: Faults
 ) -> dict[Path, float]:
-    """Return the offset of each recording, which is named by its path or its name alone.
+    """Return the offset of each recording, named by its path, its name, or that with its folder.
 
     Parameters
     ----------
@@ -32,7 +32,8 @@ def offsets_by_path(
     found: dict[Path, float] = {}
     files = [file for path in paths for file in _files_of(path)]
     for name, seconds in offsets_s.items():
-        named = [path for path in files if str(path) == name or path.name == name]
+        parts = Path(name).parts
+        named = [path for path in files if str(path) == name or path.parts[-len(parts) :] == parts]
         if not named:
             expected, hint = "the name of one of the recordings", ""
             if files:

@@ -36,7 +36,7 @@ def with_turns(
     """
     if not turning:
         return rows, ()
-    names = [one.path.name for one in turning]
+    names = [one.name for one in turning]
     if rows["yaw_rate_radps"].notna().any():
         own = "yaw rates not used, the speeds have their own"
         return rows, tuple(f"{name}: {own}" for name in names)
@@ -44,6 +44,6 @@ def with_turns(
     by_time = joined_times(rows).set_index("time_s")
     rates = joined_times(first.tables["odometry"]).set_index("time_s")
     joined = by_time.combine_first(rates[["yaw_rate_radps"]]).sort_index().reset_index()
-    notes = [f"odometry: yaw rates are those of {first.path.name}"]
-    notes += [f"{one.path.name}: yaw rates not used, {names[0]} has them, too" for one in others]
+    notes = [f"odometry: yaw rates are those of {first.name}"]
+    notes += [f"{one.name}: yaw rates not used, {names[0]} has them, too" for one in others]
     return joined[list(rows.columns)], tuple(notes)

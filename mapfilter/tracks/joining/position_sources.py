@@ -40,7 +40,7 @@ def measured_positions(recording: Recording) -> tuple[pd.DataFrame | None, str]:
         return rows, ""
     left = number_of(int((named != found[0]).sum()), "fix", "fixes")
     kept = rows[named == found[0]].reset_index(drop=True)
-    return kept, f"{recording.path.name}: {left} of other providers than {found[0]} left out"
+    return kept, f"{recording.name}: {left} of other providers than {found[0]} left out"
 
 
 def fixes_of(
@@ -93,7 +93,7 @@ def fixes_of(
     parts = []
     for recording, fixes in kept:
         fixes, note = without_held(fixes, motion, rounded_m[id(recording)], driven=driven)
-        notes += [f"{recording.path.name}: {note}"] if note else []
+        notes += [f"{recording.name}: {note}"] if note else []
         parts.append(fixes)
     return in_order(parts)
 
@@ -124,8 +124,8 @@ def of_one_receiver(placed: Sequence[Placed]) -> tuple[list[Placed], tuple[str, 
                 continue
             why = "as they are of another provider" if better else "as they are the same"
             notes.append(
-                f"{recording.path.name}: {number_of(int(repeated.sum()), 'position')} left out "
-                f"beside {other.path.name}, {why}"
+                f"{recording.name}: {number_of(int(repeated.sum()), 'position')} left out "
+                f"beside {other.name}, {why}"
             )
             left = left[~repeated].reset_index(drop=True)
         if len(left):
@@ -234,12 +234,12 @@ def _stated_notes(placed: Sequence[Placed], truth: pd.DataFrame | None) -> list[
     for recording, fixes in placed:
         if recording.format != "csv":
             continue
-        others = [(one.path.name, rows) for one, rows in placed if one is not recording]
+        others = [(one.name, rows) for one, rows in placed if one is not recording]
         if truth is not None and len(truth):
             others = [("the truth", truth), *others]
         found = (stated_note(fixes, rows, name) for name, rows in others)
         if note := next(filter(None, found), ""):
-            notes.append(f"{recording.path.name}: {note}")
+            notes.append(f"{recording.name}: {note}")
     return notes
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -46,14 +47,31 @@ def read_recordings(
     if reading.shared and not faults.found:
         _check_named(recordings, options.columns, faults)
     faults.raise_if_any(InputError)
+    recordings = _told_apart(recordings)
     return recordings, (*notes, *_zone_note(options.zone, recordings))
+
+
+def _told_apart(recordings: Sequence[Recording]) -> list[Recording]:
+    """Return recordings of which those of one name have names with their folders."""
+    count = Counter(one.path.name for one in recordings)
+    inside = Counter(_in_folder(one.path) for one in recordings)
+    return [
+        one
+        if count[one.path.name] == 1
+        else replace(one, name=name if inside[name := _in_folder(one.path)] == 1 else str(one.path))
+        for one in recordings
+    ]
+
+
+def _in_folder(path: Path) -> str:
+    return "/".join(path.parts[-2:])
 
 
 def _zone_note(zone: str, recordings: Sequence[Recording]) -> tuple[str, ...]:
     """Return a note on a zone that no recording needed; none without one."""
     if not zone or any(one.by_zone for one in recordings):
         return ()
-    clocks = listed([f"{one.path.name} {one.clock}" for one in recordings], 3)
+    clocks = listed([f"{one.name} {one.clock}" for one in recordings], 3)
     return (f"--zone has no effect: no times are local without a zone ({clocks})",)
 
 
@@ -61,7 +79,7 @@ def _check_named(
     recordings: Sequence[Recording], columns: Mapping[str, str], faults: Faults
 ) -> None:
     """Note columns that none of several recordings has."""
-    names = ", ".join(one.path.name for one in recordings)
+    names = ", ".join(one.name for one in recordings)
     named = {name for one in recordings for name in one.named}
     for name, column in columns.items():
         if name not in named:

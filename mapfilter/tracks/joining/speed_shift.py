@@ -6,7 +6,7 @@ from math import isfinite
 
 import numpy as np
 
-from mapfilter._types import Floats
+from mapfilter._types import Bools, Floats
 
 _WITHIN_S, _PERIOD_S = 60.0, 0.5
 _FEWEST_S, _LEAST, _TIMES, _GAIN, _PEAK_S = 180.0, 0.7, 3.0, 0.05, 8.0
@@ -14,6 +14,8 @@ _FEWEST_S, _LEAST, _TIMES, _GAIN, _PEAK_S = 180.0, 0.7, 3.0, 0.05, 8.0
 _REMARKABLE_S, _HALF_S, _LONGEST_S = 1.5, 2.5, 7200.0
 _STEADY = 1e-3
 """Speeds that differ by no more than this share are one speed and the rounding of positions."""
+_GAP_S, _GAPS = 10.0, 5.0
+"""Gaps as long as this, and so many times as long as usual, are those of a receiver."""
 _LEAP_S = (17.0, 19.0)
 """GPS time is 18 s ahead of UTC since 2017."""
 
@@ -114,11 +116,28 @@ def _correlation(one: Speeds, other: Speeds, shift_s: float) -> float:
         return float("nan")
     # Means beside an end would fall there in both.
     at_s = np.arange(begin_s + _HALF_S, end_s - _HALF_S, _PERIOD_S)
+    # While a receiver is jammed its speeds are not those of the ends of its gap.
+    at_s = at_s[measured(one, at_s) & measured(other, at_s - shift_s)]
+    if _PERIOD_S * at_s.size < _FEWEST_S - 2 * _HALF_S:
+        return float("nan")
     first, second = _smoothed(one, at_s), _smoothed(other, at_s - shift_s)
     spread = float(first.std() * second.std())
     if spread <= _STEADY**2 * float(first.mean() * second.mean()):
         return float("nan")
     return float(np.mean((first - first.mean()) * (second - second.mean()))) / spread
+
+
+def measured(speeds: Speeds, at_s: Floats) -> Bools:
+    """Return at which moments, with half the time of a mean about them, speeds have no long gap."""
+    time_s = speeds[0]
+    gap_s = np.diff(time_s)
+    long_s = max(_GAP_S, _GAPS * float(np.median(gap_s)))
+    ends = np.flatnonzero(gap_s > long_s)
+    begin_s, end_s = time_s[ends] - _HALF_S, time_s[ends + 1] + _HALF_S
+    # Gaps are in order, and do not overlap.
+    before = np.searchsorted(begin_s, at_s, side="right") - 1
+    within = (before >= 0) & (at_s < np.append(end_s, -np.inf)[before])
+    return np.asarray(~within, dtype=np.bool_)
 
 
 def _smoothed(speeds: Speeds, at_s: Floats) -> Floats:

@@ -35,6 +35,7 @@ from mapfilter.tracks.readers.plain.steps import add_steps, are_counted
 from mapfilter.tracks.readers.plain.technology import with_technologies
 from mapfilter.tracks.readers.plain.times import times_of
 from mapfilter.tracks.readers.plain.unused import unused_columns, unused_note
+from mapfilter.tracks.readers.plain.value_units import with_value_units
 from mapfilter.tracks.readers.plain.weeks import week_column
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.texts.columns import Columns
@@ -100,7 +101,8 @@ def read_columns(rows: Columns, reading: Reading, options: ReadOptions) -> None:
     InputError
         A field or column that does not exist, a unit of another quantity in a name, no times.
     """
-    rows = with_full_names(rows, {name.lower() for name in options.columns.values()})
+    named = {name.lower() for name in options.columns.values()}
+    rows = with_value_units(with_full_names(rows, named), named)
     mapped = with_bare_degrees(mapped_columns(rows, reading, options))
     mapped = with_dates(with_technologies(mapped, reading))
     rows = mapped.rows

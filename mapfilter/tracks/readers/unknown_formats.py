@@ -42,6 +42,11 @@ _LAYOUTS = (
     ),
     (re.compile(r",mavlink_\w", re.IGNORECASE), _MESSAGES),
     (re.compile(r"\A\d{4}-\d\d-\d\d [\d:.]+: \w+ \{TimeUS : "), _MESSAGES),
+    (re.compile(r"\AFMT, ?\d+, ?\d+, ?[A-Z]"), _MESSAGES),
+    (
+        re.compile(r"\A#[A-Z0-9]{3,30}A,[A-Z0-9_]{1,16},"),
+        "messages of a NovAtel receiver; export NMEA, or RINEX",
+    ),
 )
 """First lines of exports whose columns are no quantities, and what to do."""
 RAW_FRAMES = "raw frames of a bus; decode them by its DBC (cantools), export signals as CSV"
@@ -65,8 +70,15 @@ NOT_READ = {
     ".tcx": "a TCX file; export GPX",
     ".igc": "an IGC file; export GPX",
     ".gpkg": "a GeoPackage; export its tables as CSV",
-    ".pos": "a solution of RTKLIB; export NMEA, or a table with one line of names as CSV",
+    ".pos": "a solution of RTKLIB without its line of names; write it with its output header",
     ".ubx": "binary messages of a u-blox receiver; export NMEA, or RINEX",
+    ".sbf": "binary messages of a Septentrio receiver; export NMEA, or RINEX",
+    ".ulg": "a log of PX4; write its tables as CSV (ulog2csv), and give vehicle_gps_position",
+    ".bin": _MESSAGES,
+    ".tlog": _MESSAGES,
+    ".bag": "a bag of ROS; write its topics as CSV (rostopic echo -b BAG -p TOPIC)",
+    ".db3": "a bag of ROS 2; write its topics as CSV",
+    ".mcap": "a bag of ROS 2; write its topics as CSV",
     ".xlsx": "a spreadsheet; export it as CSV",
     ".xls": "a spreadsheet; export it as CSV",
     ".ods": "a spreadsheet; export it as CSV",

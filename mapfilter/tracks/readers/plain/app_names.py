@@ -89,6 +89,11 @@ _PROGRAMS = (
             "vel_m_s": "speed [m/s]",
         },
     ),
+    _Program(
+        "columns as of positions of PX4 (degrees, m)",
+        frozenset(("time_utc_usec", "latitude_deg", "longitude_deg", "fix_type")),
+        {"altitude_msl_m": "altitude [m]", "eph": "accuracy [m]", "vel_m_s": "speed [m/s]"},
+    ),
     # Without times that a converter adds those of the GPS week count.
     _Program(
         "columns as of positions of ArduPilot",
@@ -110,6 +115,11 @@ _PROGRAMS = (
             "gspeed": "speed [mm/s]",
             "headmot": "course [deg]",
         },
+    ),
+    _Program(
+        "columns as of GPSLogger (m, m/s)",
+        frozenset(("time", "lat", "lon", "elevation", "speed", "ageofdgpsdata", "dgpsid")),
+        {"elevation": "altitude [m]", "speed": "speed [m/s]"},
     ),
     _Program(
         "columns as of records of FIT (semicircles, seconds since 1989-12-31)",

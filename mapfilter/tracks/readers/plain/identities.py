@@ -26,7 +26,7 @@ def cell_identities(mapped: Mapped) -> dict[str, Floats]:
     A cell of an eNodeB, given by the numbers of both, has the identity of LTE that these make. What
     a text of an identity holds fills what has no column of its own.
     """
-    mapped = _without_hexadecimals(mapped)
+    mapped = _without_hexadecimals(_with_whole_networks(mapped))
     identity = {name: mapped.whole(name) for name in IDENTITY}
     identity |= _networks(identity["mcc"], identity["mnc"])
     for name in {"eci", "nci"}.intersection(mapped.columns("ci")[1:]):
@@ -84,6 +84,14 @@ def _without_hexadecimals(mapped: Mapped) -> Mapped:
             if letters >= _LEAST_LETTERS * len(words) or note in rows.reading.notes:
                 rows = rows.rewritten(r"^\s*([0-9A-Fa-f]+)\s*$", r"0x\1", name)
                 rows.reading.note(note)
+    return replace(mapped, rows=rows)
+
+
+def _with_whole_networks(mapped: Mapped) -> Mapped:
+    """Return columns whose codes of country and network are one number, as 24491 for 244-91."""
+    rows = mapped.rows
+    for name in mapped.columns("mcc"):
+        rows = rows.rewritten(r"^\s*(\d{3})[-/_ ,.](\d{1,3})\s*$", r"\1\2", name)
     return replace(mapped, rows=rows)
 
 

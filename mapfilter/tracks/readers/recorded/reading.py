@@ -45,7 +45,8 @@ class Reading(Remarks):
     :func:`mapfilter.tracks.readers.clocks.local_times.doubled_s`, and the note on it; ``by_zone``
     whether any of them is UTC by the zone that was given; ``date_order`` whether dates with the
     year at the end begin with "day" or "month", as one of them shows, or the order of dates of
-    digits. ``kept`` are rows that ``ending`` takes when all parts are read.
+    digits; ``value_units`` the units behind the values of columns. ``kept`` are rows that
+    ``ending`` takes when all parts are read.
     """
 
     path: Path
@@ -65,6 +66,7 @@ class Reading(Remarks):
     doubled: tuple[float, str] = (0.0, "")
     by_zone: bool = False
     date_order: str = ""
+    value_units: dict[str, str] = field(default_factory=dict)
     columns: dict[str, str] = field(default_factory=dict)
     kept: list[pd.DataFrame] = field(default_factory=list)
     ending: Callable[[pd.DataFrame], None] | None = None

@@ -77,6 +77,8 @@ class Recording:
         Of a plain CSV: the fields of a column map whose columns it has.
     by_zone : bool
         Whether local times were turned into UTC by a zone that was given.
+    name : str
+        In messages: that of the file, with its folder where others of the journey have it, too.
     """
 
     path: Path
@@ -93,17 +95,22 @@ class Recording:
     unread: tuple[str, ...] = ()
     named: tuple[str, ...] = ()
     by_zone: bool = False
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            object.__setattr__(self, "name", self.path.name)
 
     @property
     def losses(self) -> tuple[str, ...]:
         """What of the file is not used, rows and values, with its name."""
         rows = (f"not used: {found}" for found in self.unusable)
-        return tuple(f"{self.path.name}: {text}" for text in (*rows, *self.ignored))
+        return tuple(f"{self.name}: {text}" for text in (*rows, *self.ignored))
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """Losses and all other notes, with the file's name."""
-        others = (f"{self.path.name}: {note}" for note in self.notes if note not in self.ignored)
+        others = (f"{self.name}: {note}" for note in self.notes if note not in self.ignored)
         return (*self.losses, *others)
 
     @property
