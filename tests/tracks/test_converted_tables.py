@@ -303,3 +303,25 @@ def test_a_date_that_is_not_understood_is_told_beside_hours(tmp_path):
     (tmp_path / "drive.csv").write_text("date,hour,min,sec,lat,lon\n01/05/2026,23,59,1,60.1,24.9\n")
     with pytest.raises(InputError, match="day or month first"):
         mf.read_log(tmp_path / "drive.csv")
+
+
+@pytest.mark.parametrize("date", ["13/05/2026", "05-13-2026"])
+def test_dates_in_other_orders_keep_minutes_and_seconds(tmp_path, date):
+    """Each position was of the whole hour."""
+    rows = [f"{date},10,{minute},5.5,60.1{minute:04d},24.9" for minute in range(3)]
+    path = tmp_path / "drive.csv"
+    path.write_text("\n".join(["date,hour,min,sec,lat,lon", *rows]) + "\n")
+    log = mf.read_log(path, zone="+00:00")
+    assert log.gnss["time_s"].tolist() == [0.5, 60.5, 120.5]
+    assert log.start_utc_s == pd.Timestamp("2026-05-13T10:00:05Z").timestamp()
+
+
+def test_the_zone_of_a_date_does_not_move_it(tmp_path):
+    """Times were of the day before."""
+    rows = "2026-05-01 00:00:00+02:00,10,0,1,60.1,24.9\n"
+    (tmp_path / "drive.csv").write_text(f"date,hour,min,sec,lat,lon\n{rows}")
+    log = mf.read_log(tmp_path / "drive.csv", zone="+02:00")
+    assert (
+        log.start_utc_s + log.gnss["time_s"].iloc[0]
+        == pd.Timestamp("2026-05-01T08:00:01Z").timestamp()
+    )

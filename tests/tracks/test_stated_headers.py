@@ -243,6 +243,8 @@ def test_an_export_of_a_cars_diagnosis_is_read(tmp_path):
     np.testing.assert_allclose(found.tables["positions"]["speed_mps"], 10.0)
     assert found.unread == ("device time", "g(x)")
     assert found.clock.kind == "utc"
+    start_s = pd.Timestamp("2026-05-28T20:26:40Z").timestamp()
+    assert found.tables["positions"]["time_s"].tolist() == [start_s + k for k in range(9)]
 
 
 def test_units_behind_values_are_those_of_a_header(tmp_path):

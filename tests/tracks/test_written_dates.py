@@ -1,10 +1,12 @@
 """Dates as spreadsheets, phones and receivers write them: other orders, and no separators."""
 
+import numpy as np
 import pandas as pd
 import pytest
 
 import mapfilter as mf
 from mapfilter.errors import InputError
+from mapfilter.tracks.readers.texts import text
 
 START_S = pd.Timestamp("2026-05-13T10:00:58Z").timestamp()
 
@@ -22,11 +24,16 @@ def read(tmp_path, header, times, zone="+00:00"):
         "13/05/2026 {}",
         "5/13/2026 {}",
         "13-05-2026 {}",
+        "13/05/2026T{}Z",
+        '"13/05/2026, {}"',
+        '"5/13/2026, {} AM"',
         "Wed May 13 {} GMT+00:00 2026",
         "Wed May 13 {} UTC 2026",
         "Wed May 13 {} 2026",
         '"Wed, 13 May 2026 {} GMT"',
+        "Wed May 13 2026 {} GMT+0000 (Coordinated Universal Time)",
         "2026-05-13T{}+00:00[Europe/London]",
+        "2026-05-13T{}+00:00[Etc/GMT+0]",
     ],
 )
 def test_dates_that_are_of_one_order_are_read(tmp_path, times):
@@ -37,12 +44,27 @@ def test_dates_that_are_of_one_order_are_read(tmp_path, times):
     assert log.gnss["time_s"].tolist() == [0.0, 1.0, 2.0]
 
 
-@pytest.mark.parametrize("digits", ["20260513{}", "20260513{}000"])
+@pytest.mark.parametrize("digits", ["20260513{}", "20260513{}000", "20260513{}.0", "20260513{}Z"])
 def test_times_without_separators_are_no_unix_times(tmp_path, digits):
     """They were taken for the year 2612."""
     log = read(tmp_path, "time", [digits.format(one) for one in (100058, 100059, 100100)])
     assert log.start_utc_s == START_S
     assert log.gnss["time_s"].tolist() == [0.0, 1.0, 2.0]
+
+
+def test_one_time_without_separators_among_unix_times_is_left_out(tmp_path):
+    """It was taken for a time, and the file's clock for a local one."""
+    unix_ms = [int(1000 * START_S) + 1000 * n for n in range(5)]
+    log = read(tmp_path, "time", [*unix_ms, 20260513100059], zone="Europe/Berlin")
+    assert log.gnss["time_s"].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert any("zone has no effect" in note for note in log.notes)
+
+
+@pytest.mark.parametrize("begin", [19_500_000_000_000, 18_999_999_999_999])
+def test_nanoseconds_of_a_phone_are_no_dates(tmp_path, begin):
+    """Those of five to six hours after its start were said to be none of the usual times."""
+    with pytest.raises(InputError, match="5 rows: time: not between 1980 and 2100"):
+        read(tmp_path, "time", [begin + n * 1_000_000_000 for n in range(5)])
 
 
 def test_one_date_shows_the_order_of_all(tmp_path):
@@ -78,3 +100,43 @@ def test_a_column_in_utc_needs_no_zone(tmp_path):
     log = read(tmp_path, "time (utc)", ["2026-05-13 10:00:58"], zone="Europe/Berlin")
     assert log.start_utc_s == START_S
     assert any("zone has no effect" in note for note in log.notes)
+
+
+@pytest.mark.parametrize(
+    ("header", "rows"),
+    [
+        # Seconds of the day beside a date.
+        ("date,time", [f"20260513,{36_058 + n}" for n in range(60)]),
+        # Days of a spreadsheet, and numbers that are no dates.
+        ("date,time", [f"46143,{10_150 + n / 10:g}" for n in range(50)]),
+        ("last_update,time", [f"260513,{10_100 + n}" for n in range(50)]),
+        ("candidates,time", [f"{12_000 + n},{10_100 + n}" for n in range(50)]),
+        # The index of a table, as pandas writes it.
+        (",time", [f"{12_000 + n},{10_100 + n}" for n in range(50)]),
+    ],
+)
+def test_seconds_beside_other_numbers_are_no_times_of_day(tmp_path, header, rows):
+    """They were refused, or noted as times of day whose date is not clear."""
+    log = read(tmp_path, header, rows)
+    assert len(log.gnss) == len(rows)
+    assert np.isnan(log.start_utc_s)
+    assert not any("day or year first" in note or "of the day" in note for note in log.notes)
+
+
+def test_a_whole_date_of_digits_may_be_of_any_year(tmp_path):
+    """Before 2016 it was said to be of two orders."""
+    log = read(tmp_path, "date,time", ["20150513,100058", "20150513,100059"])
+    assert log.start_utc_s == pd.Timestamp("2015-05-13T10:00:58Z").timestamp()
+
+
+def test_parts_of_a_file_have_one_order(tmp_path, monkeypatch):
+    """The first was seconds of a day, the next ones Unix times; and 5 was no time."""
+    monkeypatch.setattr(text, "_PART_BYTES", 512)
+    clear = [f"130526,2359{n:02d}" for n in range(60)] + [f"140526,{n}" for n in range(60)]
+    log = read(tmp_path, "date,time", clear)
+    assert log.gnss["time_s"].tolist() == list(range(120))
+    assert log.start_utc_s == pd.Timestamp("2026-05-13T23:59:00Z").timestamp()
+    unclear = [one.replace("130526", "310526").replace("140526", "10626") for one in clear]
+    log = read(tmp_path, "date,time", unclear)
+    assert np.isnan(log.start_utc_s)
+    assert np.ptp(log.gnss["time_s"]) < 86_400

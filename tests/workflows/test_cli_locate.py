@@ -299,12 +299,15 @@ def test_a_clock_of_the_truth_is_set_by_an_offset(tmp_path):
 
 
 def test_a_track_log_takes_no_offset(folder, tmp_path):
-    given = ["--db", folder / "surveys", "--out", tmp_path / "out", "--log", folder / "walk"]
     told = "a track log has the times of its tables"
-    outcome = mapfilter("locate", *given, "--offset", "walk=5")
-    assert_refused(outcome, "--offset: expected the name of one of the recordings, found 'walk'")
-    assert told in outcome.err
-    assert "parquet" not in outcome.err
+    for log in ("walk", "surveys"):
+        given = ["--db", folder / "surveys", "--out", tmp_path / "out", "--log", folder / log]
+        outcome = mapfilter("locate", *given, "--offset", "walk=5")
+        assert_refused(
+            outcome, "--offset: expected the name of one of the recordings, found 'walk'"
+        )
+        assert told in outcome.err
+        assert "parquet" not in outcome.err
 
 
 def test_truth_and_zone_are_those_of_one_recording(folder, tmp_path):

@@ -38,7 +38,7 @@ def offsets_by_path(
             expected, hint = "the name of one of the recordings", ""
             if files:
                 expected += f" ({listed([path.name for path in files])})"
-            elif any(map(is_log, paths)):
+            elif any(map(_has_logs, paths)):
                 hint = "a track log has the times of its tables; offsets are those of recordings"
             faults.add(where, expected, repr(name), hint)
         elif not (isfinite(seconds) and abs(seconds) <= _MOST_S):
@@ -62,6 +62,11 @@ def check_origin(origin_deg: tuple[float, float], where: str, faults: Faults) ->
     hint = "longitude and latitude swapped" if swapped else ""
     got = f"{lat_deg:g}, {lon_deg:g}"
     faults.add(where, "a latitude and a longitude in degrees", got, hint)
+
+
+def _has_logs(path: Path) -> bool:
+    """Return whether a path is a track log, or a folder of some."""
+    return path.is_dir() and any(map(is_log, (path, *path.iterdir())))
 
 
 def _files_of(path: Path) -> list[Path]:

@@ -2,43 +2,68 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from mapfilter._types import Floats
+from mapfilter.tracks.readers.clocks.times import LEAST_UNIX_S
 
 _COMPACT = r"^((?:19|20)\d\d)(\d\d)(\d\d)(\d\d)(\d\d)(\d\d)"
 """A date and a time in one number, such as 20260501101530, with milliseconds or without."""
-_COMPACT_RANGES = ((1.9e13, 2.1e13), (1.9e16, 2.1e16))
-_YEAR_LAST = r"^(\d\d?)([/-])(\d\d?)[/-]((?:19|20)\d\d)\b"
-_YEAR_FIRST = {"day": r"\4-\3-\1", "month": r"\4-\1-\3"}
+_COMPACT_RANGES = ((1.9e13, 2.1e13, 1.0), (1.9e16, 2.1e16, 1e3))
+_PARTS = ((0, 60), (0, 59), (0, 23), (1, 31), (1, 12))
+"""Seconds, minutes, hours, days and months: the least and the largest."""
+_LEAST_TIMES = 0.5
+_ZONE = r"(Z|[+-]\d\d:?\d\d)?"
+_YEAR_LAST = r"^(\d\d?)[/-](\d\d?)[/-]((?:19|20)\d\d)(\D|$)"
+_YEAR_FIRST = {"day": r"\3-\2-\1\4", "month": r"\3-\1-\2\4"}
 _LAST_MONTH = 12
 _DAY_OF_WEEK = r"^(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun),?\s+"
 _CLOCK = r"\d\d:\d\d:\d\d"
 _DAY = rf"{_DAY_OF_WEEK}(\w{{3}}) +(\d\d?) ({_CLOCK})"
 _REWRITTEN = (
+    # A comma before the time of day, as a browser writes it.
+    (r"^(\d{1,4}[/-]\d\d?[/-]\d{1,4}),?\s+", r"\1 "),
     # A zone's name after its offset, as Java writes it.
-    (r"(Z|[+-]\d\d:?\d\d)\[[A-Za-z_/+-]+\]$", r"\1"),
+    (r"(Z|[+-]\d\d:?\d\d)\[[\w/+-]+\]$", r"\1"),
     # Java's Date.toString(), such as Fri May 01 10:00:00 GMT+02:00 2026; and a date of mails.
     (rf"{_DAY} (?:GMT|UTC)([+-]\S+) (\d{{4}})$", r"\2-\1-\5 \3\4"),
     (rf"{_DAY} (?:GMT|UTC) (\d{{4}})$", r"\2-\1-\4 \3Z"),
     (rf"{_DAY} (\d{{4}})$", r"\2-\1-\4 \3"),
+    # A browser's, such as Fri May 01 2026 10:00:00 GMT+0200 (CEST).
+    (
+        rf"{_DAY_OF_WEEK}(\w{{3}}) (\d\d) (\d{{4}}) ({_CLOCK}) GMT([+-]\d{{4}})(?: \(.*\))?$",
+        r"\2-\1-\3 \4\5",
+    ),
     (rf"{_DAY_OF_WEEK}(\d\d? \w{{3}} \d{{4}} {_CLOCK})", r"\1"),
-    (rf"{_COMPACT}$", r"\1-\2-\3 \4:\5:\6"),
-    (rf"{_COMPACT}\.?(\d{{3}})$", r"\1-\2-\3 \4:\5:\6.\7"),
+    (rf"{_COMPACT}{_ZONE}$", r"\1-\2-\3 \4:\5:\6\7"),
+    (rf"{_COMPACT}(?:\.?(\d{{3}})|\.(\d{{1,9}})){_ZONE}$", r"\1-\2-\3 \4:\5:\6.\7\8\9"),
 )
 
 
 def are_compact(numbers: Floats) -> bool:
-    """Return whether numbers are dates and times without separators: no Unix time is so large.
+    """Return whether most numbers are dates and times without separators.
+
+    No Unix time is so large; of the nanoseconds since a phone was started few are months, days,
+    hours, minutes and seconds.
 
     Examples
     --------
-    >>> import numpy as np
     >>> are_compact(np.array([20260501101530.0])), are_compact(np.array([1777629330000.0]))
     (True, False)
+    >>> are_compact(19_500_000_000_000 + 1e9 * np.arange(9))
+    False
     """
-    return any(bool(((numbers >= low) & (numbers < high)).any()) for low, high in _COMPACT_RANGES)
+    count = 0
+    for low, high, scale in _COMPACT_RANGES:
+        rest = numbers[(numbers >= low) & (numbers < high)] // scale
+        good = np.ones(rest.size, dtype=bool)
+        for least, most in _PARTS:
+            rest, part = np.divmod(rest, 100.0)
+            good &= (part >= least) & (part <= most)
+        count += int(np.count_nonzero(good))
+    return bool(count > _LEAST_TIMES * np.count_nonzero(numbers >= LEAST_UNIX_S))
 
 
 def order_of(column: pa.ChunkedArray) -> str:

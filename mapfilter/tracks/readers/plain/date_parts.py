@@ -27,8 +27,8 @@ _UTC = "itow"
 _LAST = (23, 59, 60)
 _YEARS = 1980, 2099
 _YEARS_S = 315_532_800.0, 4_102_444_800.0
-_DIGITS = re.compile(r"^((?:19|20)\d\d)(\d\d)(\d\d)$")
-"""A date without separators, such as 20260501."""
+_DAY = re.compile(r"^((?:19|20)\d\d)(-?)(\d\d)\2(\d\d)(?:[T ].*)?$")
+"""A date, also without separators, such as 20260501; its midnight and zone are left out."""
 
 
 def _columns(names: Sequence[str], own: Collection[str]) -> list[str]:
@@ -66,10 +66,10 @@ def parts_of_dates(rows: Columns, own: Collection[str] = ()) -> Columns:
         return rows
     *day, hour = parts[:-2]
     midnight_s = _of_dates(rows) if day == [_DATE] else _of_numbers(rows, day)
+    # The reader of times reads dates in other orders, or tells how to write them.
+    others = day == [_DATE] and not np.isfinite(midnight_s).any()
+    midnight_s = np.zeros(len(rows)) if others else midnight_s
     good = np.isfinite(midnight_s)
-    if day == [_DATE] and not good.any():
-        # Of a date that is not understood the reader of times tells how to write it.
-        return rows.joined(_DATE, hour)
     numbers = [rows.number(name) for name in parts[-3:]]
     for number, most in zip(numbers, _LAST, strict=True):
         good &= (number >= 0) & (number <= most)
@@ -79,13 +79,17 @@ def parts_of_dates(rows: Columns, own: Collection[str] = ()) -> Columns:
     whole_us = np.where(good, midnight_s, 0.0) * 1e6 + np.round(np.where(good, elapsed_us, 0.0))
     texts = np.datetime_as_string(whole_us.astype(np.int64).astype("datetime64[us]"), unit="us")
     rows.reading.note(f"time: columns {', '.join(parts)}")
-    return rows.filled(hour, np.where(good, texts, "").astype(object))
+    texts = np.where(good, texts, "").astype(object)
+    if others:
+        clocks = np.array([text.partition("T")[2] for text in texts.tolist()], dtype=object)
+        return rows.filled(hour, clocks).joined(_DATE, hour)
+    return rows.filled(hour, texts)
 
 
 def _of_dates(rows: Columns) -> Floats:
     """Return the seconds from 1970 of the midnights of dates; NaN where they are not understood."""
     words, which = np.unique(rows.texts(_DATE).astype(np.str_), return_inverse=True)
-    plain = [_DIGITS.sub(r"\1-\2-\3", word) for word in words.tolist()]
+    plain = [_DAY.sub(r"\1-\3-\4", word) for word in words.tolist()]
     time_s, _ = parse_times(np.array(plain, dtype=object))
     time_s = np.where((time_s >= _YEARS_S[0]) & (time_s < _YEARS_S[1]), time_s, np.nan)
     return np.asarray((time_s // DAY_S * DAY_S)[which])

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mapfilter._types import Floats
 from mapfilter.tracks.readers.plain.mapped import Mapped
 from mapfilter.tracks.readers.texts.columns import Columns
 
@@ -16,13 +17,19 @@ _A_DATE = re.compile(r"(\d{4}([-./])\d{1,2}\2\d{1,2}|\d{1,2}([-./])\d{1,2}\3\d{4
 _OF_DAY = re.compile(r"\d{1,2}:\d\d")
 _DIGITS_OF_DAY = re.compile(r"\d{5,6}(\.\d*)?")
 """Hours, minutes and seconds without separators, such as 101530; a spreadsheet drops a 0 before."""
+_FEW_DIGITS_OF_DAY = re.compile(r"\d{1,6}(\.\d*)?")
 _DIGITS = re.compile(r"\d{5,6}|(?:19|20)\d{6}")
+_NAMED_DATE = re.compile(r"(?<!up)date")
+"""In the name of a column, which is none of updates."""
 _ORDERS = {
     "year, month, day": (r"^\s*((?:19|20)\d\d)(\d\d)(\d\d)\s*$", r"\1-\2-\3"),
     "year (of the century), month, day": (r"^\s*(\d\d)(\d\d)(\d\d)\s*$", r"20\1-\2-\3"),
     "day, month, year (of the century)": (r"^\s*(\d\d)(\d\d)(\d\d)\s*$", r"20\3-\2-\1"),
 }
 """Dates without separators: the first has eight digits."""
+_UNCLEAR = "day or year first"
+_WHOLE = 8
+_LEAST_OF_DAY = 0.9
 _FIRST_DAY, _LAST_DAY = np.datetime64("2016-01-01"), np.datetime64("2036-01-01")
 """Of such a date with six digits, which may be read in two orders."""
 
@@ -38,7 +45,10 @@ def with_dates(mapped: Mapped) -> Mapped:
     rows, name = mapped.rows, mapped.rows.find(*mapped.names("time"))
     if name is None or name == _DATE:
         return mapped
-    if _DIGITS_OF_DAY.fullmatch(rows.first_text(name)):
+    # After midnight a later part of a file may begin with 5 for 00:00:05.
+    known = rows.reading.date_order in _ORDERS
+    digits = _FEW_DIGITS_OF_DAY if known else _DIGITS_OF_DAY
+    if digits.fullmatch(rows.first_text(name)):
         return _of_digits(mapped, name)
     if not _OF_DAY.match(rows.first_text(name)):
         return mapped
@@ -59,34 +69,66 @@ def _joined(mapped: Mapped, rows: Columns, date: str, name: str) -> Mapped:
 def _of_digits(mapped: Mapped, name: str) -> Mapped:
     """Return columns with times of digits after dates of digits, if a column has such dates."""
     rows = mapped.rows
-    dates = [one for one in rows.names if "date" in one and one not in mapped.taken]
-    date = _DATE if _DATE in dates else dates[0] if len(dates) == 1 else ""
-    given = np.unique(rows.texts(date)[rows.with_digits(date)].astype(np.str_)).tolist()
-    if not given or not all(_DIGITS.fullmatch(one) for one in given):
+    dates = [one for one in rows.names if _NAMED_DATE.search(one) and one not in mapped.taken]
+    dates = [_DATE] if _DATE in dates else dates
+    order = rows.reading.date_order
+    # Later parts of a file are read as the first one.
+    if len(dates) != 1 or order == _UNCLEAR:
         return mapped
-    order = rows.reading.date_order or _order(given)
-    if not order:
-        rows.reading.note(OF_DAY)
-        rows.reading.note(f"{date}: {given[0]}: day or year first? Write 2026-05-01")
-        return mapped
-    if not rows.reading.date_order and order != next(iter(_ORDERS)):
-        rows.reading.note(f"{date}: {order}")
-    rows.reading.date_order = order
-    changed = rows.rewritten(r"^\s*(\d{5})(\.\d*)?\s*$", r"0\1\2", name)
-    changed = changed.rewritten(r"^\s*(\d\d)(\d\d)(\d\d)", r"\1:\2:\3", name)
+    date = dates[0]
+    if order not in _ORDERS:
+        given = np.unique(rows.texts(date)[rows.with_digits(date)].astype(np.str_)).tolist()
+        if not (given and all(map(_DIGITS.fullmatch, given)) and _are_of_day(rows.number(name))):
+            return mapped
+        orders = _orders(given)
+        if not orders:
+            return mapped
+        if len(orders) > 1:
+            rows.reading.date_order = _UNCLEAR
+            rows.reading.note(OF_DAY)
+            rows.reading.note(f"{date}: {given[0]}: {_UNCLEAR}? Write 2026-05-01")
+            return mapped
+        order = rows.reading.date_order = orders[0]
+        if order != next(iter(_ORDERS)):
+            rows.reading.note(f"{date}: {order}")
+    changed = rows.rewritten(r"^\s*(\d{1,6}(?:\.\d*)?)\s*$", r"00000\1", name)
+    changed = changed.rewritten(r"^\d*(\d\d)(\d\d)(\d\d)(\.\d*)?$", r"\1:\2:\3\4", name)
     changed = changed.rewritten(r"^\s*(\d{5})\s*$", r"0\1", date)
     return _joined(mapped, changed.rewritten(*_ORDERS[order], date), date, name)
 
 
-def _order(given: list[str]) -> str:
-    """Return in which order dates of digits are written; "" where none or two would do."""
+def _are_of_day(number: Floats) -> bool:
+    """Return whether numbers are times of day, save a few; of the seconds of a day many are not."""
+    known, of_day = np.isfinite(number), np.isfinite(seconds_in_digits(number))
+    return bool(np.count_nonzero(of_day) >= _LEAST_OF_DAY * np.count_nonzero(known))
+
+
+def _orders(given: list[str]) -> list[str]:
+    """Return in which orders dates of digits may be written."""
     found = []
-    for order, (pattern, by) in _ORDERS.items():
+    whole = all(len(one) == _WHOLE for one in given)
+    for order in list(_ORDERS)[:1] if whole else list(_ORDERS)[1:]:
+        pattern, by = _ORDERS[order]
         written = [re.sub(pattern, by, one.zfill(6)) for one in given]
         try:
             days = np.array(written, dtype="datetime64[D]")
         except ValueError:
             continue
-        if days.size and days.min() >= _FIRST_DAY and days.max() < _LAST_DAY:
+        if whole or (days.min() >= _FIRST_DAY and days.max() < _LAST_DAY):
             found.append(order)
-    return found[0] if len(found) == 1 else ""
+    return found
+
+
+def seconds_in_digits(number: Floats) -> Floats:
+    """Return seconds of the day for times of day in one number; NaN for other numbers.
+
+    Examples
+    --------
+    >>> seconds_in_digits(np.array([101530.25, 101560.0, 241530.0])).tolist()
+    [36930.25, nan, nan]
+    """
+    known = np.isfinite(number)
+    hours, rest = np.divmod(np.where(known, number, 0.0), 10_000.0)
+    minutes, seconds = np.divmod(rest, 100.0)
+    of_day = known & (hours >= 0) & (hours < 24) & (minutes < 60) & (seconds < 60)
+    return np.where(of_day, 3600 * hours + 60 * minutes + seconds, np.nan)

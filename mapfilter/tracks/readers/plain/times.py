@@ -27,7 +27,7 @@ from mapfilter.tracks.readers.clocks.times import (
 )
 from mapfilter.tracks.readers.clocks.written_dates import are_compact, order_of, with_year_first
 from mapfilter.tracks.readers.format import ReadOptions
-from mapfilter.tracks.readers.plain.dates import OF_DAY
+from mapfilter.tracks.readers.plain.dates import OF_DAY, seconds_in_digits
 from mapfilter.tracks.readers.plain.headers import columns_of
 from mapfilter.tracks.readers.plain.mapped import Mapped
 from mapfilter.tracks.readers.plain.weeks import (
@@ -173,11 +173,8 @@ def _without_digits(reading: Reading, number: Floats) -> Floats:
     Of seconds some would end in 60 to 99.
     """
     known = np.isfinite(number)
-    hours, rest = np.divmod(number[known], 10_000.0)
-    minutes, seconds = np.divmod(rest, 100.0)
-    if not hours.size or hours.min() < 0 or hours.max() >= 24:
-        return number
-    if minutes.max() >= 60 or seconds.max() >= 60:
+    counted = seconds_in_digits(number)
+    if not known.any() or not np.isfinite(counted[known]).all():
         return number
     steps = np.diff(np.unique(number[known]))
     # From one minute to the next such numbers jump by 40.
@@ -186,8 +183,6 @@ def _without_digits(reading: Reading, number: Floats) -> Floats:
     if not (long or OF_DAY in reading.notes):
         return number
     reading.note(OF_DAY)
-    counted = number.copy()
-    counted[known] = 3600 * hours + 60 * minutes + seconds
     return counted
 
 

@@ -146,7 +146,7 @@ class Columns:
     def _with_year_first(self, column: pa.ChunkedArray, names: Sequence[str]) -> Columns:
         """Return columns with a column of times in the order of ISO 8601; note another one."""
         reading, name = self.reading, self.find(*names) or ""
-        if not reading.date_order and (order := order_of(column)):
+        if reading.date_order not in ("day", "month") and (order := order_of(column)):
             reading.date_order = order
             reading.note(f"time: the {order} first in dates with slashes or hyphens")
         ordered = with_year_first(column, reading.date_order)
