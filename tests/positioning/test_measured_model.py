@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 from small_area import ON_WAY, OPTIONS, make_area
 
+from mapfilter.filters.belief_models import Cloud
+from mapfilter.filters.contract import Reason
+from mapfilter.models.street_motion import EAST, NORTH, STATES
 from mapfilter.positioning.bayes.sources.evidence import RadioReading
 from mapfilter.positioning.bayes.sources.measured_model import MeasuredMapModel
 
@@ -55,11 +58,16 @@ def test_the_strongest_levels_of_a_place_have_no_deviation_of_their_own():
 
 
 def test_statistics_of_serving_cells_are_all_that_weighs_them():
-    pixel, weight = np.array([0, 10, 30], dtype=np.int32), np.full(3, 7.0)
+    state = np.zeros((STATES, 3), dtype=np.float32)
+    state[EAST], state[NORTH] = [5.0, 35.0, 62.0], [66.0, 41.0, 12.0]
+    statistics, weight = Statistics(), np.full(3, 7.0)
     reading = RadioReading(1, 0.5, timing_advance=3.0)
-    found = model(serving_model=Statistics())._serving("memory", "kept", pixel, weight, reading)
-    assert found == ("kept", [])
-    np.testing.assert_allclose(weight, [4.0, 3.0, 1.0])
+    cloud = Cloud(state, np.empty((0, 3), np.float32))
+    _, reason = model(serving_model=statistics).weigh(cloud, weight, reading)
+    assert reason is Reason.USED
+    ((first, second, third),) = statistics.asked
+    assert first < second < third
+    np.testing.assert_allclose(weight, [4.0 - first / 10, 4.0 - second / 10, 4.0 - third / 10])
 
 
 def test_serving_cells_are_compared_by_their_statistics():
