@@ -104,6 +104,8 @@ def test_how_motion_is_read_is_told(monkeypatch, changes, left, motion, label, b
     if "hold" not in changes:
         changes = {"hold": before, **changes}
     monkeypatch.setattr(tested, "judged", lambda _, state, **__: replace(state, **changes))
+    # A belief that waits is not judged.
+    monkeypatch.setattr(tested, "waits", lambda *_: None)
     monkeypatch.setattr(BeliefFilters, "may_have_left", lambda *_: left)
     _, output = stepped(given={"motion": (STEP,) if motion else ()}, hold=before)
     assert told(output) == ([("motion", "", label)] if label else [])
@@ -119,7 +121,8 @@ def test_how_motion_is_read_is_told(monkeypatch, changes, left, motion, label, b
 @pytest.mark.parametrize("given", [{}, {"radio": (ROW,)}])
 def test_only_a_reading_brings_a_lost_position_back(given):
     """It agrees from the first reading on: 20 m of way are asked for."""
-    state, _ = stepped(given=given, recovery=Recovery(), null=NullHypothesis(-12.0))
+    doubted = {"status": Status.UNCERTAIN, "recovery": Recovery(), "null": NullHypothesis(-12.0)}
+    state, _ = stepped(given=given, **doubted)
     assert state.status is Status.UNCERTAIN
     assert state.recovery.agrees_from_m == pytest.approx(0.0 if given else nan, nan_ok=True)
 
