@@ -1,6 +1,7 @@
 """When beliefs may wait for a leg: the rule, by hand."""
 
 from dataclasses import replace
+from math import nan
 from types import SimpleNamespace
 
 import pytest
@@ -40,6 +41,11 @@ def test_who_walks_or_rests_waits_until_a_report_is_due(before, after):
     assert rule(rested(before), after)(1e6)
     found = rule(rested(before), after, radio=(HEARD,))
     assert (found(44.0), found(45.0)) == (True, False)
+
+
+def test_rows_without_a_number_measure_nothing():
+    unranged = Pseudorange("G01", nan, nan, (nan, nan, nan))
+    assert rule(pseudoranges=(unranged,), tdoa=(Difference("a", "b", nan),))(1e6)
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import chain
 from math import isfinite
 
 from mapfilter.filters.contract import Reason, Status
@@ -64,6 +65,8 @@ def _may_wait(beliefs: BeliefFilters, state: BayesState, usable: UsableEpoch) ->
 
 def _measures(epoch: Epoch) -> bool:
     """Return whether an epoch measures something else than motion, cells and levels."""
-    if epoch.gnss is not None or epoch.pseudoranges or epoch.tdoa:
+    if epoch.gnss is not None:
         return True
-    return any(isfinite(row.timing_advance) for row in epoch.radio)
+    ranges = (one.pseudorange_m for one in epoch.pseudoranges)
+    times = (one.difference_m for one in epoch.tdoa), (row.timing_advance for row in epoch.radio)
+    return any(map(isfinite, chain(ranges, *times)))
