@@ -1,6 +1,7 @@
 """When beliefs may wait for a leg: the rule, by hand."""
 
 from dataclasses import replace
+from math import nan
 from types import SimpleNamespace
 
 import pytest
@@ -13,7 +14,8 @@ from mapfilter.positioning.bayes.waiting import waits
 from mapfilter.positioning.epochs import Difference, Epoch, GnssFix, Pseudorange, ReportRow
 from mapfilter.positioning.sensors.rest import Rest
 
-TRACKED = BayesState(status=Status.TRACKING, belief=belief(), sources={"radio": 40.0})
+BEGUN = BayesState(status=Status.TRACKING, belief=belief(), sources={"radio": 40.0})
+TRACKED = BEGUN.with_output(Reported(BEGUN.belief, Status.TRACKING, 0.0, None))
 HEARD = ReportRow("serving", "a", None, None, -70.0, 0)
 RADIO = SimpleNamespace(name="radio", due=lambda used_m, travelled_m: travelled_m - used_m >= 5)
 REST = Rest(0.0, pace_mps=1.4)
@@ -39,6 +41,11 @@ def test_who_walks_or_rests_waits_until_a_report_is_due(before, after):
     assert rule(rested(before), after)(1e6)
     found = rule(rested(before), after, radio=(HEARD,))
     assert (found(44.0), found(45.0)) == (True, False)
+
+
+def test_rows_without_a_number_measure_nothing():
+    unranged = Pseudorange("G01", nan, nan, (nan, nan, nan))
+    assert rule(pseudoranges=(unranged,), tdoa=(Difference("a", "b", nan),))(1e6)
 
 
 @pytest.mark.parametrize(
@@ -75,14 +82,10 @@ def test_what_is_compared_with_beliefs_does_not_wait(measured):
         {"state": replace(TRACKED, contested=True)}, {"state": replace(TRACKED, belief=None)},
         {"state": replace(TRACKED, status=Status.CONVERGED)},
         {"state": replace(TRACKED, status=Status.UNCERTAIN)},
-        # What was reported is of another belief: nobody has judged this one.
+        # Nothing was reported, or it was of another belief: nobody has judged this one.
+        {"state": BEGUN},
         {"state": TRACKED.with_output(Reported(belief(), Status.TRACKING, 0.0, None))},
     ],
 )  # fmt: skip
 def test_a_belief_in_doubt_does_not_wait(more):
     assert rule(**more) is None
-
-
-def test_a_belief_that_was_reported_waits():
-    reported = Reported(TRACKED.belief, Status.TRACKING, 0.0, None)
-    assert rule(TRACKED.with_output(reported))(1e6)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import chain
 from math import isfinite
 
 from mapfilter.filters.contract import Reason, Status
@@ -48,7 +49,7 @@ def _may_wait(beliefs: BeliefFilters, state: BayesState, usable: UsableEpoch) ->
     if not isinstance(state.belief, ParticleBelief) or state.contested:
         return False
     known = state.reported
-    if state.status in _JUDGED_ANEW or (known is not None and known.belief is not state.belief):
+    if state.status in _JUDGED_ANEW or known is None or known.belief is not state.belief:
         # The status is not judged yet, or not of this belief.
         return False
     if usable.motion is not Reason.USED or _measures(usable.epoch):
@@ -64,6 +65,8 @@ def _may_wait(beliefs: BeliefFilters, state: BayesState, usable: UsableEpoch) ->
 
 def _measures(epoch: Epoch) -> bool:
     """Return whether an epoch measures something else than motion, cells and levels."""
-    if epoch.gnss is not None or epoch.pseudoranges or epoch.tdoa:
+    if epoch.gnss is not None:
         return True
-    return any(isfinite(row.timing_advance) for row in epoch.radio)
+    ranges = (one.pseudorange_m for one in epoch.pseudoranges)
+    times = (one.difference_m for one in epoch.tdoa), (row.timing_advance for row in epoch.radio)
+    return any(map(isfinite, chain(ranges, *times)))
