@@ -11,6 +11,7 @@ from small_area import make_area
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.models.street_motion import STATES, MotionErrors
 from mapfilter.positioning.bayes.beliefs import smoothing
+from mapfilter.positioning.bayes.beliefs.legs import NO_LEG
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning
 from mapfilter.positioning.bayes.beliefs.smoothing import BayesSmoother
 from mapfilter.positioning.bayes.rivals.hold import Hold
@@ -27,7 +28,7 @@ def state_at(travelled_m):
     )
     return SimpleNamespace(
         reckoning=reckoning, belief=belief, alternative=None, takeovers=0, hold=Hold(),
-        alone_from_m=nan, held=(),
+        leg=NO_LEG, alone_from_m=nan, held=(),
     )  # fmt: skip
 
 
