@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from made_town import Town, walk_log
 
-from mapfilter.filters.contract import MotionStep, Reason, Status
+from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.street_motion import BIAS, LOG_SCALE, STATES, MotionErrors, moving
 from mapfilter.models.street_motion import noise_of_step as noise
@@ -16,7 +16,6 @@ from mapfilter.positioning.bayes.beliefs.path import DeadReckoning
 from mapfilter.positioning.bayes.beliefs.smoothing import BayesSmoother
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.rivals.hold import Hold
-from mapfilter.positioning.bayes.state import step_output
 from mapfilter.positioning.epochs import Epoch, GnssFix, ReportRow
 from mapfilter.positioning.merging import epochs
 from mapfilter.serving.state_file import decode, encode
@@ -34,10 +33,7 @@ def positioner():
 
 def begun(**more):
     rng = np.random.default_rng(3)
-    # The status of a belief is judged before it waits.
-    state = positioner().begin_at(*START_M, 3.0, rng)
-    state, _ = step_output(positioner().area, state, 0.0, Reason.NO_READING, ())
-    return replace(state, **more), rng
+    return replace(positioner().begin_at(*START_M, 3.0, rng), **more), rng
 
 
 def walked(state, rng, *motion, since_s=0):

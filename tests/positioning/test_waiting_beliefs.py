@@ -14,8 +14,7 @@ from mapfilter.positioning.bayes.waiting import waits
 from mapfilter.positioning.epochs import Difference, Epoch, GnssFix, Pseudorange, ReportRow
 from mapfilter.positioning.sensors.rest import Rest
 
-BEGUN = BayesState(status=Status.TRACKING, belief=belief(), sources={"radio": 40.0})
-TRACKED = BEGUN.with_output(Reported(BEGUN.belief, Status.TRACKING, 0.0, None))
+TRACKED = BayesState(status=Status.TRACKING, belief=belief(), sources={"radio": 40.0})
 HEARD = ReportRow("serving", "a", None, None, -70.0, 0)
 RADIO = SimpleNamespace(name="radio", due=lambda used_m, travelled_m: travelled_m - used_m >= 5)
 REST = Rest(0.0, pace_mps=1.4)
@@ -82,10 +81,14 @@ def test_what_is_compared_with_beliefs_does_not_wait(measured):
         {"state": replace(TRACKED, contested=True)}, {"state": replace(TRACKED, belief=None)},
         {"state": replace(TRACKED, status=Status.CONVERGED)},
         {"state": replace(TRACKED, status=Status.UNCERTAIN)},
-        # Nothing was reported, or it was of another belief: nobody has judged this one.
-        {"state": BEGUN},
+        # What was reported is of another belief: nobody has judged this one.
         {"state": TRACKED.with_output(Reported(belief(), Status.TRACKING, 0.0, None))},
     ],
 )  # fmt: skip
 def test_a_belief_in_doubt_does_not_wait(more):
     assert rule(**more) is None
+
+
+def test_a_belief_that_was_reported_waits():
+    reported = Reported(TRACKED.belief, Status.TRACKING, 0.0, None)
+    assert rule(TRACKED.with_output(reported))(1e6)

@@ -49,7 +49,7 @@ def _may_wait(beliefs: BeliefFilters, state: BayesState, usable: UsableEpoch) ->
     if not isinstance(state.belief, ParticleBelief) or state.contested:
         return False
     known = state.reported
-    if state.status in _JUDGED_ANEW or known is None or known.belief is not state.belief:
+    if state.status in _JUDGED_ANEW or (known is not None and known.belief is not state.belief):
         # The status is not judged yet, or not of this belief.
         return False
     if usable.motion is not Reason.USED or _measures(usable.epoch):
