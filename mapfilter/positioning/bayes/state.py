@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 from math import isfinite, nan, sqrt
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from mapfilter.errors import InputError, fail
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import empty_summary
@@ -17,6 +19,7 @@ from mapfilter.positioning.bayes.beliefs.legs import NO_LEG, Lead, Leg, moved_on
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning as DeadReckoning
 from mapfilter.positioning.bayes.beliefs.path import RecentPath
 from mapfilter.positioning.bayes.certainty import Recovery
+from mapfilter.positioning.bayes.clocks import Clocks
 from mapfilter.positioning.bayes.rivals.alternative import (
     AlternativeHypothesis,
     MapBelief,
@@ -100,6 +103,8 @@ class BayesState:
         Checksum of the area that it is of; empty where nobody states it.
     leg : Leg
         Steps by which its beliefs have not been moved yet.
+    clocks : Clocks or None
+        Whether reports and motion have one clock; None while no position is followed.
     """
 
     belief: MapBelief | None = None
@@ -128,6 +133,7 @@ class BayesState:
     alone_from_m: float = nan
     area: str = ""
     leg: Leg = NO_LEG
+    clocks: Clocks | None = None
 
     def with_output(self, reported: Reported) -> BayesState:
         """Return the state with its output."""
@@ -152,6 +158,7 @@ class BayesState:
             unaided=(),
             proven=False,
             leg=NO_LEG,
+            clocks=None,
         )
 
     @property
@@ -278,12 +285,17 @@ def _output(
             if count:
                 tail = sample_tail(*places, summary.mean, p_none=state.null.probability)
                 wide_m, protection_m = protected_m(tail, summary.radii_m)
+    radii_m, clocks = summary.radii_m, state.clocks
+    if clocks is not None and any(clocks.wider_m):
+        *wider_m, more_m = clocks.wider_m
+        radii_m = radii_m + np.array(wider_m)
+        wide_m, protection_m = wide_m + more_m, protection_m + more_m
     fix = Fix(
         time_s,
         float(summary.mean[0]) + west,
         float(summary.mean[1]) + south,
         summary.covariance_m2,
-        summary.radii_m,
+        radii_m,
         state.status,
         count,
         summary.mass_50m if count else nan,
