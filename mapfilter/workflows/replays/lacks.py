@@ -204,8 +204,8 @@ def clocks_note(estimate: TrackEstimate) -> tuple[str, ...]:
     last = told[-1]
     later = "earlier" if last.what.startswith("-") else "later"
     text = f"radio: by {last.time_s:.0f} s reports fit the positions of about {last.what[1:]} "
-    text += f"{later}; clocks of reports and motion may differ, and radii allow for it; convert --offset "
-    return (f"{text}FILE=S moves the times of a recording",)
+    text += f"{later}; clocks of reports and motion may differ, and radii allow for it; "
+    return (f"{text}convert --offset FILE=S moves the times of a recording",)
 
 
 def pause_note(estimate: TrackEstimate) -> tuple[str, ...]:
