@@ -15,9 +15,11 @@ from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
+from mapfilter._arguments import PATH, Argument, check_arguments
 from mapfilter._same import EqualByContent
 from mapfilter._types import Floats
 from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.geodesy import short_crs
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.step_output import StepOutput
@@ -67,6 +69,10 @@ class Filter(ABC, Generic[StateT]):
     ``begin`` and ``step`` are all that a filter needs. They are pure: states are never changed in
     place, and the generator alone decides the result.
     """
+
+    def __repr__(self) -> str:
+        """Return its class, name and CRS: the map that it holds has millions of numbers."""
+        return f"<{type(self).__name__} {self.name!r}, {short_crs(self.crs)}>"
 
     @property
     @abstractmethod
@@ -148,3 +154,17 @@ class FilterOptions(Protocol):
         ways : bool
             Whether positions are matched to ways; success and errors do not need it.
         """
+
+
+def check_over(options: FilterOptions, database: object) -> None:
+    """Check that options are bound to a database.
+
+    Raises
+    ------
+    ConfigError
+        It is something else, such as its path.
+    """
+    expected = "a database of open_database or build"
+    path = ((PATH, "its path; open_database opens it"),)
+    where = f"{type(options).__name__}.over"
+    check_arguments(where, Argument("database", database, RadioRouteDatabase, expected, path))

@@ -42,7 +42,8 @@ def read_cell_plan(
 
     Commas, semicolons or tabs, UTF-8, one header line; decimal commas where they separate nothing.
     Columns: cell, lat and lon (WGS 84) *or* east and north (in the CRS of a ``crs`` column, which
-    may be in feet, with a note; else in ``crs``), height_m, eirp_dbm, frequency_mhz; and when
+    may be in feet, with a note; else in ``crs``), which may have the names of logs (``lat_deg``,
+    ``lon_deg``, ``east_m``, ``north_m``); height_m, eirp_dbm, frequency_mhz; and when
     wanted site, azimuth_deg, antenna, and the other fields of :class:`Cell`. An empty field takes
     the default; without an azimuth the antenna is omnidirectional.
 
