@@ -8,6 +8,7 @@ every one that comes in: equal epochs give equal bytes.
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -15,10 +16,11 @@ from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
-from mapfilter._arguments import PATH, Argument, check_arguments
+from mapfilter._arguments import shown
 from mapfilter._same import EqualByContent
 from mapfilter._types import Floats
 from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.errors import ConfigError, fail
 from mapfilter.geodesy import short_crs
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import TrackEstimate
@@ -157,14 +159,14 @@ class FilterOptions(Protocol):
 
 
 def check_over(options: FilterOptions, database: object) -> None:
-    """Check that options are bound to a database.
+    """Check that options are not bound to the path of a database.
 
     Raises
     ------
     ConfigError
-        It is something else, such as its path.
+        They are.
     """
-    expected = "a database of open_database or build"
-    path = ((PATH, "its path; open_database opens it"),)
-    where = f"{type(options).__name__}.over"
-    check_arguments(where, Argument("database", database, RadioRouteDatabase, expected, path))
+    if isinstance(database, str | os.PathLike):
+        where, expected = f"{type(options).__name__}.over, database", "a database of open_database"
+        hint = "its path; open_database opens it"
+        raise fail(ConfigError, where, expected, shown(database), hint)
