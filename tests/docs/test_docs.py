@@ -9,6 +9,7 @@ import textwrap
 import tomllib
 from dataclasses import fields
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +58,25 @@ def test_examples_of_each_page(name):
         str(DOCS / name), module_relative=False, encoding="utf-8", verbose=False
     )
     assert failed == 0
+
+
+def test_all_that_pages_import_is_there():
+    """Also in scripts, which the tests compile and do not run."""
+    shown = [
+        (module, name)
+        for path in [*PAGES, Path("..") / "README.md"]
+        for module, one, several in re.findall(
+            r"from (mapfilter[\w.]*) import (?:([\w, ]+)|\(([^)]+)\))", page(str(path))
+        )
+        for name in re.findall(r"\w+", re.sub(r" as \w+", "", one or several))
+    ]
+    assert len(shown) > 100
+    missing = [(module, name) for module, name in shown if not _has_name(module, name)]
+    assert missing == []
+
+
+def _has_name(module: str, name: str) -> bool:
+    return hasattr(import_module(module), name) or find_spec(f"{module}.{name}") is not None
 
 
 def test_the_quickstart_has_examples():

@@ -14,7 +14,7 @@ import mapfilter as mf
 from mapfilter.errors import ConfigError
 from mapfilter.lattice import Lattice
 from mapfilter.options import Options
-from mapfilter.radio.cells import write_cell_plan
+from mapfilter.radio.plan_files import write_cell_plan
 from mapfilter.roads.osm import read_ways
 from mapfilter.roads.routes import read_roads
 
