@@ -35,7 +35,8 @@ from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.loop import locate
 from mapfilter.simulation.worlds.faults import TURNED_DEG, GivenInputs
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.store import list_logs, read_log
+from mapfilter.tracks.log_folders import list_logs
+from mapfilter.tracks.store import read_log
 from mapfilter.workflows.evaluations.foreign import load_foreign, prepare, write_journeys
 from mapfilter.workflows.inputs.world import World
 from mapfilter.workflows.learn import run_accept, run_learn

@@ -40,6 +40,9 @@ run_path(str(Path(__file__).with_name("notebook_files.py")))["write_all"](
     Path(__file__).parent / "notebooks", Path(__file__).parent / "_static" / "notebooks"
 )
 
+# Which object a short name in a docstring means.
+_MEANT = run_path(str(Path(__file__).with_name("meant_names.py")))
+
 # Pages of modules that are gone would stay and fail the next build.
 rmtree(Path(__file__).parent / "api", ignore_errors=True)
 autosummary_generate = True
@@ -50,8 +53,6 @@ autodoc_use_type_comments = False
 autodoc_default_options = {"members": True}
 _ALIASES = "ArrayLike Bools Bounds Floats Floats32 Geometries Ints Ints32 Levels Progress Rows"
 autodoc_type_aliases = {name: name for name in _ALIASES.split()}
-# Types in docstrings are short names, of which several packages may have one.
-suppress_warnings = ["ref.python"]
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 # Examples in docstrings are run by pytest, with the names of their modules.
@@ -81,18 +82,32 @@ def _sidebar_of_modules(
 class _Names(PythonDomain):
     """The names of Python, where what was looked up is kept.
 
-    Short names of types in docstrings are compared with all names that there are.
+    Short names of types in docstrings are compared with all names that there are. Of several
+    objects the order would be that in which processes have read pages.
     """
 
     _found: dict[tuple[object, ...], list[Any]] | None = None
+    _imported: dict[str, dict[str, str]] | None = None
 
     def find_obj(self, env: Any, *sought: Any) -> list[Any]:
-        """Return the objects of a name; pages are resolved when all of them have been read."""
+        """Return the object of a name; pages are resolved when all of them have been read."""
         if self._found is None:
             self._found = {}
         if sought not in self._found:
-            self._found[sought] = super().find_obj(env, *sought)
+            found = super().find_obj(env, *sought)
+            module, _, name, _, by_ending = sought
+            self._found[sought] = (
+                self._meant(found, module or "") if by_ending and "." not in name else found
+            )
         return list(self._found[sought])
+
+    def _meant(self, found: list[Any], module: str) -> list[Any]:
+        if self._imported is None:
+            self._imported = {}
+        if module not in self._imported:
+            self._imported[module] = _MEANT["imported_names"](module)
+        names = _MEANT["meant"]([name for name, _ in found], module, self._imported[module])
+        return [one for one in found if one[0] in names]
 
 
 def _find_no_definitions(_parser: Parser) -> None:

@@ -35,7 +35,8 @@ from mapfilter.report.basemap import BaseMap
 from mapfilter.report.snapshots import plot_belief, story_bounds_m
 from mapfilter.tracks.joining.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.store import list_logs, read_log
+from mapfilter.tracks.log_folders import list_logs
+from mapfilter.tracks.store import read_log
 from mapfilter.workflows.inputs.filter_choice import filter_choice
 from mapfilter.workflows.outputs.served import served_points, street_map
 

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from mapfilter.api.logs import make_log as make_log
     from mapfilter.api.logs import read_log as read_log
     from mapfilter.api.pictures import save_picture as save_picture
+    from mapfilter.api.plans import read_cell_plan as read_cell_plan
     from mapfilter.api.reports import locate_reports as locate_reports
     from mapfilter.api.scored import Score as Score
     from mapfilter.api.scored import score as score
@@ -40,12 +41,16 @@ if TYPE_CHECKING:
     from mapfilter.database.radioroutes import RadioRouteDatabase as RadioRouteDatabase
     from mapfilter.database.store import open_database as open_database
     from mapfilter.errors import MapfilterError as MapfilterError
+    from mapfilter.evaluation.first_fix import FirstFixOptions as FirstFixOptions
+    from mapfilter.filters.contract import MotionStep as MotionStep
     from mapfilter.filters.contract import Status as Status
     from mapfilter.lattice import Lattice as Lattice
     from mapfilter.positioning.bayes.options import BayesFilter as BayesFilter
     from mapfilter.positioning.bayes.options import GridFilter as GridFilter
     from mapfilter.positioning.candidate import CandidateFilter as CandidateFilter
     from mapfilter.positioning.epochs import Epoch as Epoch
+    from mapfilter.positioning.epochs import GnssFix as GnssFix
+    from mapfilter.positioning.epochs import ReportRow as ReportRow
     from mapfilter.positioning.estimate import TrackEstimate as TrackEstimate
     from mapfilter.positioning.filter import Filter as Filter
     from mapfilter.positioning.fingerprints.located import LocatedReports as LocatedReports
@@ -57,8 +62,9 @@ if TYPE_CHECKING:
     from mapfilter.positioning.merging import epochs as epochs
     from mapfilter.positioning.step_output import Fix as Fix
     from mapfilter.positioning.step_output import StepOutput as StepOutput
+    from mapfilter.radio.cells import Cell as Cell
     from mapfilter.radio.cells import CellPlan as CellPlan
-    from mapfilter.radio.plan_files import read_cell_plan as read_cell_plan
+    from mapfilter.rasters.geotiff_writer import write_rasters as write_rasters
     from mapfilter.rasters.opening import open_rasters as open_rasters
     from mapfilter.rasters.raster_set import RxLevRasters as RxLevRasters
     from mapfilter.roads.lattice import RouteLattice as RouteLattice
@@ -77,6 +83,7 @@ _NAMES = {
     "api.located": "Track locate",
     "api.logs": "make_log read_log",
     "api.pictures": "save_picture",
+    "api.plans": "read_cell_plan",
     "api.reports": "locate_reports",
     "api.scored": "Score score",
     "api.studies": "sweep",
@@ -85,11 +92,12 @@ _NAMES = {
     "database.radioroutes": "RadioRouteDatabase",
     "database.store": "open_database",
     "errors": "MapfilterError",
-    "filters.contract": "Status",
+    "evaluation.first_fix": "FirstFixOptions",
+    "filters.contract": "MotionStep Status",
     "lattice": "Lattice",
     "positioning.bayes.options": "BayesFilter GridFilter",
     "positioning.candidate": "CandidateFilter",
-    "positioning.epochs": "Epoch",
+    "positioning.epochs": "Epoch GnssFix ReportRow",
     "positioning.estimate": "TrackEstimate",
     "positioning.filter": "Filter",
     "positioning.fingerprints.located": "LocatedReports",
@@ -98,8 +106,8 @@ _NAMES = {
     "positioning.kalman.filter": "KalmanFilter",
     "positioning.merging": "epochs",
     "positioning.step_output": "Fix StepOutput",
-    "radio.cells": "CellPlan",
-    "radio.plan_files": "read_cell_plan",
+    "radio.cells": "Cell CellPlan",
+    "rasters.geotiff_writer": "write_rasters",
     "rasters.opening": "open_rasters",
     "rasters.raster_set": "RxLevRasters",
     "roads.lattice": "RouteLattice",

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from mapfilter.degrees import NO_MAPS, ONE_SIDE
 from mapfilter.errors import InputError, fail
-from mapfilter.geodesy import NO_MAPS, ONE_SIDE, unproject
+from mapfilter.geodesy import unproject
 
 _EARTH_RADIUS_M = 6_371_000.0
 _SHORT_M = 100.0

@@ -39,12 +39,15 @@ class Argument(NamedTuple):
         What it may be.
     expected : str
         The same in words, with the function that makes it.
+    instead : tuple of (type or union of types, str)
+        What others are likely to be given, and what to do with each.
     """
 
     name: str
     value: object
     kinds: type | UnionType
     expected: str
+    instead: tuple[tuple[type | UnionType, str], ...] = ()
 
     def accepts(self, value: object) -> bool:
         """Return whether a value is of one of the kinds; true and false are no numbers."""
@@ -196,9 +199,11 @@ def items(
     return [Argument(f"{name}[{k}]", one, kinds, expected) for k, one in enumerate(listed)]
 
 
-def path_argument(name: str, value: object) -> Argument:
-    """Return a path to be checked."""
-    return Argument(name, value, PATH, "a path")
+def path_argument(
+    name: str, value: object, instead: tuple[tuple[type | UnionType, str], ...] = ()
+) -> Argument:
+    """Return a path to be checked; ``instead`` as of :class:`Argument`."""
+    return Argument(name, value, PATH, "a path", instead)
 
 
 def generator(function: str, seed: int | np.random.Generator) -> np.random.Generator:
@@ -242,13 +247,18 @@ def _wrong(one: Argument | Setting | Entries) -> Sequence[Argument | Setting]:
 def _hint(one: Argument | Entries, arguments: Sequence[Argument | Entries]) -> str:
     """Return that arguments were exchanged, where that would mend the call or one fault of it.
 
-    Or that an object was made by classes of before, of which only their names are the same.
+    Or that an object was made by classes of before, of which only their names are the same; or
+    what to do with one that is likely to be given instead.
     """
     for other in arguments:
         misplaced = one.accepts(other.value) or not other.accepts(other.value)
         if misplaced and other.accepts(one.value):
             return f"arguments exchanged; the order is {', '.join(each.name for each in arguments)}"
-    return _AGAIN if isinstance(one, Argument) and _is_namesake(one) else ""
+    if not isinstance(one, Argument):
+        return ""
+    if _is_namesake(one):
+        return _AGAIN
+    return next((what for kinds, what in one.instead if isinstance(one.value, kinds)), "")
 
 
 def _is_namesake(one: Argument) -> bool:

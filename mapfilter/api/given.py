@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
+import pandas as pd
+
 from mapfilter._arguments import PATH, Argument
-from mapfilter.api.logs import read_log, read_log_of_area
+from mapfilter.api.logs import TABLE, read_log, read_log_of_area
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
 from mapfilter.tracks.checks.placeless import in_frame
 from mapfilter.tracks.log import TrackLog
+
+OTHER_LOGS = (
+    (pd.DataFrame, TABLE),
+    (Mapping, "logs by their names, as of simulate: give one of them"),
+)
+"""What is given for a log, and what to do with it."""
 
 
 def database_argument(value: object) -> Argument:
@@ -26,7 +35,8 @@ def optional_database(value: object) -> Argument:
 
 def log_argument(value: object) -> Argument:
     """Return the argument ``log`` to be checked."""
-    return Argument("log", value, TrackLog | PATH, "a log of read_log or make_log, or its path")
+    expected = "a log of read_log or make_log, or its path"
+    return Argument("log", value, TrackLog | PATH, expected, OTHER_LOGS)
 
 
 def opened(database: RadioRouteDatabase | Path | str) -> RadioRouteDatabase:

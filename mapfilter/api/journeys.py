@@ -7,7 +7,7 @@ from mapfilter.api.python_words import python_words
 from mapfilter.options import Positive
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.names import named_by_plan
-from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.rasters.raster_set import ARRAYS, RxLevRasters
 from mapfilter.roads.network import StreetNetwork, street_network
 from mapfilter.roads.osm import Profile
 from mapfilter.roads.routes import ROADS_EXPECTED, read_roads
@@ -111,7 +111,7 @@ def reports_argument(value: object) -> Argument:
 
 def rasters_argument(value: object) -> Argument:
     """Return rasters, to be checked."""
-    return Argument("rasters", value, RxLevRasters, "rasters of open_rasters")
+    return Argument("rasters", value, RxLevRasters, "rasters of open_rasters", ARRAYS)
 
 
 def roads_argument(value: object) -> Argument:

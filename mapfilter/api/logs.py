@@ -26,6 +26,8 @@ from mapfilter.tracks.pdr.options import WalkOptions
 
 _FILES = "a path, or several"
 _WALK = WalkOptions()
+TABLE = "a table; mf.make_log(crs, motion=…) makes a log of it"
+"""What to do with a table that is given for a log."""
 
 make_log = python_log(tables.make_log)
 
@@ -167,8 +169,7 @@ def _several(name: str, paths: object) -> list[Path]:
     if isinstance(paths, str | os.PathLike):
         return [Path(paths)]
     if isinstance(paths, pd.DataFrame):
-        hint = "a table; mf.make_log(crs, motion=…) makes a log of it"
-        raise fail(ConfigError, f"read_log, {name}", _FILES, shown(paths), hint)
+        raise fail(ConfigError, f"read_log, {name}", _FILES, shown(paths), TABLE)
     if hasattr(paths, "read"):
         hint = "an open file; give its path"
         raise fail(ConfigError, f"read_log, {name}", _FILES, shown(paths), hint)

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from mapfilter._arguments import Argument, check_arguments, path_argument
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+@runtime_checkable
+class _Drawn(Protocol):
+    def plot(self) -> Any: ...
 
 
 def save_picture(picture: Axes | Figure, path: Path | str | os.PathLike[str]) -> Path:
@@ -38,7 +43,13 @@ def save_picture(picture: Axes | Figure, path: Path | str | os.PathLike[str]) ->
 
     check_arguments(
         "save_picture",
-        Argument("picture", picture, Axes | Figure, "axes or a figure, as plot returns them"),
+        Argument(
+            "picture",
+            picture,
+            Axes | Figure,
+            "axes or a figure, as plot returns them",
+            ((_Drawn, "what plot() of it returns"),),
+        ),
         path_argument("path", path),
     )
     return save(picture, Path(path))

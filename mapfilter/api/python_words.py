@@ -10,6 +10,7 @@ from functools import wraps
 from typing import ParamSpec
 
 from mapfilter.errors import MapfilterError, notes_of
+from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.log import TrackLog
 
 P = ParamSpec("P")
@@ -41,6 +42,9 @@ _SETTING = re.compile(
     r"\bfilter\.(?P<of>bayes|grid|kalman)\.(?P<name>\w+)(?: = (?P<value>[\w.]*\w))?"
 )
 _OPTIONS = {"bayes": "BayesFilter", "grid": "GridFilter", "kalman": "KalmanFilter"}
+_PLAN_LAYOUT = re.compile(r'\bcells\.layout = "(\w+)"')
+_PLAN_COLUMN = re.compile(r"\bcells\.columns\.(\w+)")
+_PLAN_DEFAULT = re.compile(r"\bcells\.([a-z]+_[a-z_]+)\b")
 _RASTERS = 'rasters.resolution_m and rasters.resampling = "bilinear"'
 _OPENED = 'mf.open_rasters(…, resolution_m=…, resampling="bilinear")'
 
@@ -60,7 +64,14 @@ def in_python(text: str) -> str:
     'if a vehicle moved, set BayesFilter(vehicle=True)'
     >>> in_python("filter.bayes.level_error_db = 7.5 (filter.kalman.fix_sd_m).")
     'BayesFilter(level_error_db=7.5) (fix_sd_m of KalmanFilter).'
+    >>> in_python('set cells.layout = "atoll", or name it in cells.columns.east')
+    'set layout="atoll", or name it in columns={"east": …}'
+    >>> in_python("set cells.eirp_dbm; else name what it holds in [cells.columns]")
+    'set defaults={"eirp_dbm": …}; else name what it holds in columns'
     """
+    text = _PLAN_LAYOUT.sub(r'layout="\1"', text).replace("[cells.columns]", "columns")
+    text = _PLAN_COLUMN.sub(r'columns={"\1": …}', text)
+    text = _PLAN_DEFAULT.sub(r'defaults={"\1": …}', text)
     text = _SETTING.sub(_option, text).replace(_RASTERS, _OPENED)
     text = text.replace("--zone of convert and replay", "zone of mf.read_log")
     parts = _COMMAND.split(text)
@@ -96,6 +107,18 @@ def python_log(make: Callable[P, TrackLog]) -> Callable[P, TrackLog]:
         with python_words():
             log = make(*args, **named)
         return replace(log, notes=tuple(dict.fromkeys(map(in_python, log.notes))))
+
+    return made
+
+
+def python_plan(make: Callable[P, CellPlan]) -> Callable[P, CellPlan]:
+    """Decorate what makes a cell plan: its errors and the plan's notes are in these words."""
+
+    @wraps(make)
+    def made(*args: P.args, **named: P.kwargs) -> CellPlan:
+        with python_words():
+            plan = make(*args, **named)
+        return replace(plan, notes=tuple(map(in_python, plan.notes)))
 
     return made
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mapfilter._arguments import PATH, Argument, Setting, check_arguments, generator
-from mapfilter.api.given import opened, read
+from mapfilter.api.given import OTHER_LOGS, opened, read
 from mapfilter.api.python_words import python_words
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.options import Positive
@@ -61,7 +61,13 @@ def locate_reports(
     """
     check_arguments(
         "locate_reports",
-        Argument("log", log, TrackLog | Reports | PATH, "a log, reports or the path of a log"),
+        Argument(
+            "log",
+            log,
+            TrackLog | Reports | PATH,
+            "a log, reports or the path of a log",
+            OTHER_LOGS,
+        ),
         Argument(
             "database",
             database,

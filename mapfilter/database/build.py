@@ -14,6 +14,7 @@ from threading import Thread
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from mapfilter._alone import writing_alone
 from mapfilter._arguments import (
@@ -42,11 +43,16 @@ from mapfilter.database.store import open_written
 from mapfilter.database.tiles import roads_tile, tile_windows
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.radio.cells import CellPlan
-from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.rasters.raster_set import ARRAYS, RxLevRasters
 from mapfilter.roads.lattice import RouteLattice
 
 PIXELS_A_TASK = 16_000_000
 """Pixels of a task: some eight tiles of 30 cells, which share most of their files."""
+
+_OTHER_PLANS = ((pd.DataFrame | PATH, "read_cell_plan reads a plan from a table or a file"),)
+_OTHER_ROUTES = (
+    (pd.DataFrame | PATH, "read_routes reads them from a map, a layer or a GeoDataFrame"),
+)
 
 
 def work_key(
@@ -147,9 +153,9 @@ def build(
     """
     check_arguments(
         "build",
-        Argument("rasters", rasters, RxLevRasters, "rasters of open_rasters"),
-        Argument("plan", plan, CellPlan, "a cell plan of read_cell_plan"),
-        Argument("routes", routes, RouteLattice | Routes, "routes of read_routes"),
+        Argument("rasters", rasters, RxLevRasters, "rasters of open_rasters", ARRAYS),
+        Argument("plan", plan, CellPlan, "a cell plan of read_cell_plan", _OTHER_PLANS),
+        Argument("routes", routes, RouteLattice | Routes, "routes of read_routes", _OTHER_ROUTES),
         Argument("out", out, PATH, "the path of a folder"),
         keywords=[
             Argument("margin_db", margin_db, Real, "dB"),

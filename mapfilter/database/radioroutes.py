@@ -86,6 +86,11 @@ class RadioRouteDatabase:
         return html_table("Radio-route database", rows)
 
     @property
+    def crs(self) -> str:
+        """CRS of the points, and of positions that are located."""
+        return self.lattice.crs
+
+    @property
     def cell_ids(self) -> tuple[str, ...]:
         """Ids of all cells, also of those without a level at any point."""
         return self.plan.ids

@@ -57,7 +57,7 @@ class TrackState(EqualByValue):
     time_s: float = nan
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class BeliefTracker(Filter[TrackState]):
     """A :class:`mapfilter.filters.contract.BeliefFilter` over epochs.
 

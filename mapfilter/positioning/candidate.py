@@ -16,7 +16,7 @@ from mapfilter.filters.contract import Reason
 from mapfilter.options import NotNegative
 from mapfilter.positioning.belief_tracker import BeliefTracker, TrackState
 from mapfilter.positioning.epochs import Epoch, serving_cell
-from mapfilter.positioning.filter import Hypotheses
+from mapfilter.positioning.filter import Hypotheses, check_over
 
 PointsOf = Callable[[str], CellPointIndex | None]
 
@@ -44,6 +44,7 @@ class CandidateFilter(CandidateOptions):
 
     def over(self, database: RadioRouteDatabase, *, ways: bool = True) -> CandidateTracker:
         """Return the filter over the area of a database."""
+        check_over(self, database)
         points_of = cell_points(database, self.margin_db)
         return CandidateTracker(
             CandidateSearch(points_of, self, database.lattice.resolution_m),
@@ -88,7 +89,7 @@ def startable(points_of: PointsOf) -> Callable[[str], Reason]:
     return reason
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CandidateTracker(BeliefTracker):
     """The candidate filter over epochs."""
 

@@ -193,7 +193,7 @@ def adapted(
     )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CustomTracker(BeliefTracker):
     """A custom filter of beliefs; errors in its code name its file and line."""
 

@@ -19,20 +19,29 @@ class ReportRow(EqualByValue):
     ----------
     role : str
         ``serving`` or ``neighbour``.
+    cell : str or None
+        Its id in the database; None of a neighbour that is known by carrier and code alone.
+    arfcn, bsic : int or None
+        Its carrier (ARFCN, EARFCN, …) and code (BSIC, PCI, …); None where unknown.
     level_dbm : float
         NaN where it was not reported.
     censored : int
         -1: below the reported level, 1: above it, 0: the level itself.
     timing_advance : float
         Steps; NaN where it was not reported.
+
+    Examples
+    --------
+    >>> ReportRow("serving", "A1", level_dbm=-71.0).name
+    'A1'
     """
 
     role: str
-    cell: str | None
-    arfcn: int | None
-    bsic: int | None
-    level_dbm: float
-    censored: int
+    cell: str | None = None
+    arfcn: int | None = None
+    bsic: int | None = None
+    level_dbm: float = nan
+    censored: int = 0
     timing_advance: float = nan
 
     @property
@@ -117,10 +126,21 @@ class Epoch(EqualByValue):
 
     Parameters
     ----------
+    time_s : float
+        Seconds since any start, the same for all epochs.
     motion : tuple of MotionStep
         Intervals that end now.
     radio : tuple of ReportRow
         The report, of all its rows.
+    gnss : GnssFix or None
+    pseudoranges : tuple of Pseudorange
+    tdoa : tuple of Difference
+
+    Examples
+    --------
+    >>> step, report = MotionStep(1.4, heading_rad=0.0), ReportRow("serving", "A1", level_dbm=-71.0)
+    >>> Epoch(0.0, (step,), (report,)).measured
+    True
     """
 
     time_s: float

@@ -8,6 +8,7 @@ every one that comes in: equal epochs give equal bytes.
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -15,9 +16,12 @@ from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
+from mapfilter._arguments import shown
 from mapfilter._same import EqualByContent
 from mapfilter._types import Floats
 from mapfilter.database.radioroutes import RadioRouteDatabase
+from mapfilter.errors import ConfigError, fail
+from mapfilter.geodesy import short_crs
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.step_output import StepOutput
@@ -67,6 +71,10 @@ class Filter(ABC, Generic[StateT]):
     ``begin`` and ``step`` are all that a filter needs. They are pure: states are never changed in
     place, and the generator alone decides the result.
     """
+
+    def __repr__(self) -> str:
+        """Return its class, name and CRS: the map that it holds has millions of numbers."""
+        return f"<{type(self).__name__} {self.name!r}, {short_crs(self.crs)}>"
 
     @property
     @abstractmethod
@@ -148,3 +156,17 @@ class FilterOptions(Protocol):
         ways : bool
             Whether positions are matched to ways; success and errors do not need it.
         """
+
+
+def check_over(options: FilterOptions, database: object) -> None:
+    """Check that options are not bound to the path of a database.
+
+    Raises
+    ------
+    ConfigError
+        They are.
+    """
+    if isinstance(database, str | os.PathLike):
+        where, expected = f"{type(options).__name__}.over, database", "a database of open_database"
+        hint = "its path; open_database opens it"
+        raise fail(ConfigError, where, expected, shown(database), hint)

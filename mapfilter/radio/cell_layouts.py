@@ -132,8 +132,17 @@ OF_CARRIERS = {
 IMPLIED = {**OF_CARRIERS, "psc": "UMTS"}
 """Technologies that values in columns of these names imply: of carriers in any table, as phones
 write a PCI as ``psc``, too; and in a plan."""
-_OWN: Columns = {name: (name,) for name in (*COLUMNS, "east", "north", "crs", *OFFSETS)} | {
-    name: (*((name,) if name in COLUMNS else ()), *more) for name, more in ALIASES.items()
+POSITIONS: Columns = {
+    "lat": ("lat", "lat_deg"),
+    "lon": ("lon", "lon_deg"),
+    "east": ("east", "east_m"),
+    "north": ("north", "north_m"),
+}
+"""Columns of positions in a plan, of which a table has one name each: as in plans, as in logs."""
+_OWN: Columns = {
+    **{name: (name,) for name in (*COLUMNS, "crs", *OFFSETS)},
+    **POSITIONS,
+    **{name: (*((name,) if name in COLUMNS else ()), *more) for name, more in ALIASES.items()},
 }
 LAYOUTS: Mapping[Layout, Columns] = {
     "plan": _OWN,

@@ -8,8 +8,9 @@ from pathlib import Path
 from mapfilter._constants import FOOT_M
 from mapfilter._crs_reach import area_of_use
 from mapfilter._words import number_of
+from mapfilter.degrees import degree_fault
 from mapfilter.errors import Faults
-from mapfilter.geodesy import degree_fault, project, unproject
+from mapfilter.geodesy import project, unproject
 from mapfilter.radio.arrange_cells import Arranged
 from mapfilter.radio.cell_layouts import OFFSETS
 from mapfilter.radio.cell_rows import Row

@@ -15,6 +15,7 @@ from mapfilter.radio.cell_layouts import (
     COLUMNS,
     LAYOUTS,
     OFFSETS,
+    POSITIONS,
     TRANSLATED,
     Layout,
 )
@@ -25,7 +26,8 @@ from mapfilter.radio.headings import Heading, places_named, resembling, unit_of
 from mapfilter.radio.plan_systems import stated_systems, unit_notes
 from mapfilter.radio.tables import MOST_TITLES, Table
 
-_ALLOWED = {*COLUMNS, "east", "north", "crs", *OFFSETS, *chain.from_iterable(ALIASES.values())}
+_PLACES = {name: field for field, names in POSITIONS.items() for name in names}
+_ALLOWED = {*COLUMNS, *_PLACES, "crs", *OFFSETS, *chain.from_iterable(ALIASES.values())}
 _OTHER_LAYOUTS: Mapping[Layout, str] = {
     "atoll": "transmitters of Atoll",
     "opencellid": "a list of OpenCellID or the Mozilla Location Service",
@@ -131,7 +133,11 @@ def _check_own_header(where: str, header: tuple[str, ...], faults: Faults) -> No
             faults.add(where, "known columns only", repr(name), hint)
     for name in sorted({name for name in header if header.count(name) > 1}):
         faults.add(where, "each column once", f"{name} {header.count(name)} times")
-    if {"lat", "lon"} & set(header) and {"east", "north"} & set(header):
+    for names in POSITIONS.values():
+        if len(several := [name for name in names if name in header]) > 1:
+            faults.add(where, "one column of them", " and ".join(several))
+    placed = {_PLACES[name] for name in header if name in _PLACES}
+    if {"lat", "lon"} & placed and {"east", "north"} & placed:
         faults.add(where, "lat and lon, or east and north", "both")
 
 

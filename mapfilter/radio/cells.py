@@ -1,23 +1,18 @@
-"""The cell plan: position, antenna, power and identity of every cell, and its CSV file."""
+"""The cell plan: position, antenna, power and identity of every cell."""
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mapfilter._arguments import shown
-from mapfilter._io import atomic_file
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.geodesy import project, projected_crs, same_crs, short_crs, unproject
-from mapfilter.radio.cell_layouts import COLUMNS, SELDOM
 from mapfilter.radio.cell_rules import (
     OPTIONAL,
     POINTED,
@@ -285,24 +280,3 @@ def _check_fields(cell: Cell, where: Callable[[str], str], faults: Faults) -> No
         if not allowed.holds(value) and not (value is None and name in OPTIONAL):
             hint = allowed.hint(value) if isinstance(value, int | float) else ""
             faults.add(where(name), allowed.expected, value, hint)
-
-
-def write_cell_plan(plan: CellPlan, path: Path | str) -> None:
-    """Write a cell plan as CSV that :func:`mapfilter.radio.plan_files.read_cell_plan` reads back.
-
-    Positions are longitudes and latitudes with nine decimals (0.1 mm); all else is exact.
-    """
-    lon_deg, lat_deg = unproject(
-        plan.crs, [cell.east_m for cell in plan.cells], [cell.north_m for cell in plan.cells]
-    )
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    lacking = {name for name in SELDOM if not any(getattr(cell, name) for cell in plan.cells)}
-    columns = [name for name in COLUMNS if name not in lacking]
-    writer.writerow(columns)
-    for cell, lon, lat in zip(plan.cells, lon_deg.tolist(), lat_deg.tolist(), strict=True):
-        named = {"cell": cell.id, "lat": f"{lat:.9f}", "lon": f"{lon:.9f}"}
-        named["indoor"] = str(int(cell.indoor))
-        writer.writerow(named.get(column) or getattr(cell, column) for column in columns)
-    with atomic_file(Path(path)) as temporary:
-        temporary.write_text(text.getvalue(), encoding="utf-8")

@@ -1,7 +1,9 @@
-"""Read cell plans from CSV files: those of mapfilter, of planning tools, and of public lists."""
+"""Cell plans in files: read those of mapfilter, of planning tools and public lists; write them."""
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from numbers import Real
@@ -10,11 +12,12 @@ from typing import TYPE_CHECKING, Annotated
 
 from mapfilter._annotations import Words
 from mapfilter._arguments import Entries, Setting, check_arguments, path_argument
+from mapfilter._io import atomic_file
 from mapfilter._types import Floats
 from mapfilter._words import number_of
 from mapfilter.errors import ConfigError, Faults, InputError, fail
-from mapfilter.geodesy import projected_crs
-from mapfilter.radio.cell_layouts import LAYOUTS, Layout
+from mapfilter.geodesy import projected_crs, unproject
+from mapfilter.radio.cell_layouts import COLUMNS, LAYOUTS, SELDOM, Layout
 from mapfilter.radio.cell_rules import STATED, check_fields
 from mapfilter.radio.cell_table import read_plan
 from mapfilter.radio.cells import Cell, CellPlan, check_cells
@@ -42,7 +45,8 @@ def read_cell_plan(
 
     Commas, semicolons or tabs, UTF-8, one header line; decimal commas where they separate nothing.
     Columns: cell, lat and lon (WGS 84) *or* east and north (in the CRS of a ``crs`` column, which
-    may be in feet, with a note; else in ``crs``), height_m, eirp_dbm, frequency_mhz; and when
+    may be in feet, with a note; else in ``crs``), which may have the names of logs (``lat_deg``,
+    ``lon_deg``, ``east_m``, ``north_m``); height_m, eirp_dbm, frequency_mhz; and when
     wanted site, azimuth_deg, antenna, and the other fields of :class:`Cell`. An empty field takes
     the default; without an azimuth the antenna is omnidirectional.
 
@@ -127,3 +131,24 @@ def read_cell_plan(
     check_cells(cells, lambda i, name: f"{path} row {whole[i].line}, {name}", faults, ranges=False)
     faults.raise_if_any(InputError)
     return CellPlan(crs, cells, notes, inactive)
+
+
+def write_cell_plan(plan: CellPlan, path: Path | str) -> None:
+    """Write a cell plan as CSV that :func:`read_cell_plan` reads back.
+
+    Positions are longitudes and latitudes with nine decimals (0.1 mm); all else is exact.
+    """
+    lon_deg, lat_deg = unproject(
+        plan.crs, [cell.east_m for cell in plan.cells], [cell.north_m for cell in plan.cells]
+    )
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    lacking = {name for name in SELDOM if not any(getattr(cell, name) for cell in plan.cells)}
+    columns = [name for name in COLUMNS if name not in lacking]
+    writer.writerow(columns)
+    for cell, lon, lat in zip(plan.cells, lon_deg.tolist(), lat_deg.tolist(), strict=True):
+        named = {"cell": cell.id, "lat": f"{lat:.9f}", "lon": f"{lon:.9f}"}
+        named["indoor"] = str(int(cell.indoor))
+        writer.writerow(named.get(column) or getattr(cell, column) for column in columns)
+    with atomic_file(Path(path)) as temporary:
+        temporary.write_text(text.getvalue(), encoding="utf-8")

@@ -16,10 +16,18 @@ from rasterio.errors import RasterioError
 from rasterio.io import DatasetWriter
 from rasterio.shutil import copy as copy_raster
 
-from mapfilter._arguments import shown
+from mapfilter._arguments import (
+    Argument,
+    Entries,
+    Setting,
+    check_arguments,
+    path_argument,
+    shown,
+)
+from mapfilter._arguments import items as named_items
 from mapfilter._gdal import open_raster, reason_of
 from mapfilter._io import atomic_file
-from mapfilter._types import Floats
+from mapfilter._types import Floats, Floats32
 from mapfilter.errors import InputError, MapfilterError, OutputError, fail, listed
 from mapfilter.lattice import Lattice
 from mapfilter.rasters.files import Quantity
@@ -104,13 +112,13 @@ def new_geotiff(
 def write_rasters(
     path: Path | str,
     lattice: Lattice,
-    items: Mapping[str, ArrayLike] | Iterable[tuple[str, ArrayLike]],
+    items: Mapping[str, ArrayLike] | Floats | Floats32 | Iterable[tuple[str, ArrayLike]],
     cell_ids: Sequence[str] | None = None,
     tags: Mapping[str, str] | None = None,
     *,
     quantity: Quantity = "level",
-) -> None:
-    """Write one band per cell, holding one band in memory at a time.
+) -> Path:
+    """Write one band per cell, holding one band in memory at a time; return the file's path.
 
     Values are rounded to 0.01 dB; NaN is nodata. Equal values give equal bytes.
 
@@ -118,13 +126,24 @@ def write_rasters(
     ----------
     path : Path or str
         Ends in .tif or .tiff.
-    items : mapping of cell id to array, or iterable of (cell id, array)
-        Arrays of shape (rows, cols); masked pixels are nodata. An iterable, which may make one
-        after the other, is in the order of ``cell_ids``.
+    lattice : Lattice
+        Of the pixels.
+    items : mapping of cell id to array, array, or iterable of (cell id, array)
+        Arrays of shape (rows, cols), row 0 in the north; masked pixels are nodata. One array of
+        shape (cells, rows, cols) is in the order of ``cell_ids``, and so is an iterable, which may
+        make one array after the other.
     cell_ids : sequence of str, optional
         The band descriptions; of a mapping all cells in their order when left out.
     tags : mapping of str to str, optional
         Free text kept in the file, such as how it was predicted.
+    quantity : {"level", "loss", "deviation"}
+        What the arrays hold: dBm, or dB, as of
+        :class:`~mapfilter.rasters.raster_set.RxLevRasters`.
+
+    Returns
+    -------
+    Path
+        Of the file, which :func:`~mapfilter.rasters.opening.open_rasters` opens.
 
     Raises
     ------
@@ -133,8 +152,23 @@ def write_rasters(
         there is no cell.
     OutputError
         The file cannot be written.
+    ConfigError
+        An argument is of another type.
     """
+    check_arguments(
+        "write_rasters",
+        path_argument("path", path),
+        Argument("lattice", lattice, Lattice, "a lattice"),
+        _items_argument(items),
+        keywords=[
+            *named_items("cell_ids", () if cell_ids is None else cell_ids, str, "a cell id"),
+            Entries("tags", tags, str, "a text", "texts by their names"),
+            Setting("quantity", quantity, Quantity),
+        ],
+    )
+    hint = "items as a mapping, from ids to arrays, needs none"
     if isinstance(items, Mapping):
+        hint = ""
         cell_ids = list(items) if cell_ids is None else cell_ids
         if lacking := [cell_id for cell_id in cell_ids if cell_id not in items]:
             got = f"none of {listed(lacking)}"
@@ -142,7 +176,12 @@ def write_rasters(
         of_cells: Mapping[str, ArrayLike] = items
         items = ((cell_id, of_cells[cell_id]) for cell_id in cell_ids)
     if cell_ids is None or len(cell_ids) == 0:
-        raise fail(InputError, "cell_ids", "the ids of all cells", "none")
+        raise fail(InputError, "cell_ids", "the ids of all cells", "none", hint)
+    if isinstance(items, np.ndarray):
+        if items.shape[:1] != (len(cell_ids),) or items.ndim != 3:
+            expected = f"({len(cell_ids)}, {lattice.rows}, {lattice.cols}): cells, rows, columns"
+            raise fail(InputError, "items", expected, items.shape)
+        items = zip(cell_ids, items, strict=True)
     bands = [(cell_id, "dBm" if quantity == "level" else "dB") for cell_id in cell_ids]
     tags = {**(tags or {}), QUANTITY_TAG: quantity}
     count, pixels = 0, hashlib.sha256()
@@ -162,17 +201,26 @@ def write_rasters(
         if count < len(cell_ids):
             raise fail(InputError, "bands", f"{len(cell_ids)} cells", f"{count}")
         target.update_tags(**{_PIXELS_TAG: pixels.hexdigest()})
+    return Path(path)
+
+
+def _items_argument(value: object) -> Argument | Entries:
+    """Return the arrays of all cells, to be checked."""
+    expected = "the array of each cell, by its id"
+    if isinstance(value, Mapping):
+        return Entries("items", value, object, "an array", expected)
+    return Argument("items", value, Iterable, expected)
 
 
 def _band(item: Any, number: int) -> tuple[str, Floats]:
     """Return the cell of an item, and its values; NaN where they are masked."""
     if not isinstance(item, tuple | list) or len(item) != 2:
-        raise fail(InputError, f"band {number}", "a cell id and its array", shown(item))
+        raise fail(InputError, f"items, band {number}", "a cell id and its array", shown(item))
     cell_id, given = item
     try:
         values: Floats = np.ma.asarray(given, dtype=np.float64).filled(np.nan)
     except (TypeError, ValueError) as error:
-        where = f"band {number} ({cell_id})"
+        where = f"items, band {number} ({cell_id})"
         raise fail(InputError, where, "rows of numbers", shown(given)) from error
     return cell_id, values
 

@@ -26,7 +26,7 @@ from mapfilter.rasters.files import (
     check_file,
 )
 from mapfilter.rasters.geotiff import open_geotiff
-from mapfilter.rasters.raster_set import RxLevRasters
+from mapfilter.rasters.raster_set import ARRAYS, RxLevRasters
 from mapfilter.rasters.raw_grids import open_raw_grid
 from mapfilter.rasters.resampling import Resampling, common_lattice
 
@@ -89,7 +89,7 @@ def open_rasters(
     """
     check_arguments(
         "open_rasters",
-        path_argument("path", path),
+        path_argument("path", path, ARRAYS),
         keywords=[
             Setting("quantity", quantity, Quantity | None),
             Setting("crs", crs, str | None),

@@ -1,12 +1,13 @@
 """RxLev rasters: levels or losses of many cells, read by window and never all at once.
 
-:func:`~mapfilter.rasters.opening.open_rasters` opens a set of them.
+:func:`~mapfilter.rasters.opening.open_rasters` opens a set of them, and
+:func:`~mapfilter.rasters.geotiff_writer.write_rasters` writes one of arrays.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -28,6 +29,10 @@ from mapfilter.rasters.resampling import Resampling, read_on
 
 _LARGEST_READ_BYTES = 4 << 30
 _TRIED = 3
+ARRAYS = (
+    (np.ndarray | Mapping, "arrays; write_rasters writes them to a file, which open_rasters opens"),
+)
+"""What is given for rasters, and what to do with it."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -71,6 +76,11 @@ class RxLevRasters:
         """Return name, number of cells, size and place in one line."""
         held = f"{self.quantity} of {len(self.cell_ids)} cells"
         return f"<RxLevRasters {self.path.name}: {held}, {self.lattice}>"
+
+    @property
+    def crs(self) -> str:
+        """CRS of the lattice."""
+        return self.lattice.crs
 
     def sha256(self) -> str:
         """Return the checksum of the file, or one of the names and checksums of all files."""

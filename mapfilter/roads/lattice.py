@@ -94,6 +94,11 @@ class RouteLattice:
         return f"RouteLattice({size}; {self.lattice}{notes})"
 
     @property
+    def crs(self) -> str:
+        """CRS of the lattice."""
+        return self.lattice.crs
+
+    @property
     def point(self) -> Ints:
         """Point numbers, ``row * lattice.cols + col``: the same in every rebuild, shape (N,)."""
         return self.row.astype(np.int64) * self.lattice.cols + self.col

@@ -16,8 +16,8 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter._words import counted, number_of
+from mapfilter.degrees import degree_fault
 from mapfilter.errors import Fault, InputError
-from mapfilter.geodesy import degree_fault
 from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, is_above_asu
 from mapfilter.radio.cell_rules import RANGES, id_fault
 from mapfilter.radio.identities import IDENTITY

@@ -60,7 +60,9 @@ def column_values(column: Column, given: pd.DataFrame, found: TableFaults) -> An
     if values is None:
         values = pd.Series([None] * len(given), dtype=object)
     if column.kind == "text":
-        return _texts(column, values, found)
+        # Of a column that is missing as a whole nothing is said of each row.
+        here = column if column.name in given.columns else replace(column, required=False)
+        return _texts(here, values, found)
     number, readable = _numbers(values)
     missing = np.isnan(number)
     column = replace(column, hint=column.likely(number), mistake=None)

@@ -15,13 +15,14 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.checks.placeless import in_frame
 from mapfilter.tracks.joining.identify import name_by_plan
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.log_folders import HEAD, files_in, is_log, list_logs
 from mapfilter.tracks.motion_factors import scaled_log
 from mapfilter.tracks.open_options import OpenOptions
 from mapfilter.tracks.pdr.options import without_effect
 from mapfilter.tracks.readers.texts.zipped import zip_of
 from mapfilter.tracks.schema import TABLES
 from mapfilter.tracks.sensors import sensors_of
-from mapfilter.tracks.store import HEAD, files_in, is_log, list_logs, read_log
+from mapfilter.tracks.store import read_log
 
 if TYPE_CHECKING:
     from mapfilter.tracks.readers.recorded.recording import Recording

@@ -7,7 +7,7 @@ almanac beside it (``almanac.txt``, YUMA) gives the places of satellites whose r
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict
 from difflib import get_close_matches
 from math import inf, isnan, nan
@@ -28,11 +28,11 @@ from mapfilter._json_files import (
     read_json,
     write_json,
 )
-from mapfilter._words import likely_of_no_file
-from mapfilter.errors import Faults, InputError, MapfilterError, StoreError, fail
+from mapfilter.errors import Faults, InputError, StoreError, fail
 from mapfilter.gnss.almanacs import read_yuma
 from mapfilter.tracks.imu_noise import parse_imu_noise
 from mapfilter.tracks.log import TrackLog, make_log
+from mapfilter.tracks.log_folders import HEAD, SUFFIXES, is_log, no_log, table_places
 from mapfilter.tracks.schema import OPTIONAL, SCHEMA, TABLES
 from mapfilter.tracks.sensors import (
     FOLDER,
@@ -43,17 +43,15 @@ from mapfilter.tracks.sensors import (
 )
 from mapfilter.tracks.table_files import read_table
 
-HEAD = "log.json"
 ALMANAC = "almanac.txt"
 
-_SUFFIXES = (".parquet", ".csv")
 FORMAT = "mapfilter track log"
 VERSION = 1
 _KEYS = ("format", "version", "crs", "start_utc_s", "notes", "imu", "vehicle", "parts")
 _WRITTEN = {
     f"{name}{suffix}"
     for name in (*TABLES, *(f"{FOLDER}/{sensor}" for sensor in SENSOR_COLUMNS))
-    for suffix in _SUFFIXES
+    for suffix in SUFFIXES
 }
 _ARROW = {"number": pa.float64(), "integer": pa.int64(), "text": pa.string()}
 
@@ -62,7 +60,7 @@ def _checked_parts(folder: Path, head: dict[str, Any]) -> dict[str, Path]:
     """Return the tables that the head lists, unless one is missing, cut off or changed."""
     faults = Faults()
     paths = {}
-    allowed = {f"{table}{suffix}": table for table in TABLES for suffix in _SUFFIXES}
+    allowed = {f"{table}{suffix}": table for table in TABLES for suffix in SUFFIXES}
     listed = head["parts"] if isinstance(head["parts"], list) else [head["parts"]]
     for part in listed:
         if isinstance(part, dict) and str(part.get("path")).startswith(f"{FOLDER}/"):
@@ -81,7 +79,7 @@ def _parts_by_name(folder: Path) -> dict[str, Path]:
     faults = Faults()
     paths = {}
     # What cannot be read is named by its reader: a link to nothing, a pipe, a folder.
-    there = [path for path in _table_places(folder) if path.exists() or path.is_symlink()]
+    there = [path for path in table_places(folder) if path.exists() or path.is_symlink()]
     for table in TABLES:
         found = [path for path in there if path.stem == table]
         if len(found) > 1:
@@ -96,15 +94,6 @@ def _parts_by_name(folder: Path) -> dict[str, Path]:
             faults.add(str(path), expected, path.name, f"{near[0]}.csv")
     faults.raise_if_any(InputError)
     return paths
-
-
-def _table_files(folder: Path) -> list[Path]:
-    """Return the files of a folder that have the name of a table of a log."""
-    return [path for path in _table_places(folder) if path.is_file()]
-
-
-def _table_places(folder: Path) -> Iterator[Path]:
-    yield from (folder / f"{table}{suffix}" for table in TABLES for suffix in _SUFFIXES)
 
 
 def _others(folder: Path, used: Collection[Path]) -> list[Path]:
@@ -199,7 +188,7 @@ def read_log(folder: str | Path) -> TrackLog:
     """
     folder = Path(folder)
     if not is_log(folder):
-        raise _no_log(folder, f"a track log (a folder with {HEAD})")
+        raise no_log(folder, f"a track log (a folder with {HEAD})")
     where = str(folder / HEAD)
     head = read_json(folder / HEAD)
     start_utc_s = _check_head(head, where)
@@ -222,66 +211,9 @@ def read_log(folder: str | Path) -> TrackLog:
     )
 
 
-def is_log(path: str | Path) -> bool:
-    """Return whether a path is a folder with a track log."""
-    return (Path(path) / HEAD).is_file()
-
-
-def has_tables(folder: Path) -> bool:
-    """Return whether a folder has a file with the name of a table of a log."""
-    return bool(_table_files(folder))
-
-
 def check_log_replaceable(folder: Path) -> None:
     """Raise OutputError where a folder holds other files than a log that mapfilter wrote."""
     check_replaceable(folder, HEAD, FORMAT, _WRITTEN.__contains__)
-
-
-def files_in(folder: Path) -> list[Path]:
-    """Return the files of a folder that are not hidden, by name."""
-    return [p for p in sorted(folder.iterdir()) if p.is_file() and not p.name.startswith(".")]
-
-
-def list_logs(path: str | Path) -> list[Path]:
-    """Return the log that ``path`` is, or the logs in it, by name; InputError without any."""
-    path = Path(path)
-    if is_log(path):
-        return [path]
-    inner = sorted(path.iterdir()) if path.is_dir() else []
-    faults = Faults()
-    for folder in inner:
-        if _table_files(folder) and not is_log(folder):
-            faults.found.extend(_no_log(folder, "a track log").faults)
-    faults.raise_if_any(InputError)
-    found = [folder for folder in inner if is_log(folder)]
-    if not found:
-        raise _no_log(path, "a track log, or a folder of logs")
-    return found
-
-
-def _no_log(path: Path, expected: str) -> MapfilterError:
-    """Return the error for a path that is no log, and what it lacks."""
-    tables = _table_files(path)
-    if tables:
-        got = f"{tables[0].name} without a {HEAD} beside it"
-        expected = f'{HEAD} with the CRS, such as {{"crs": "EPSG:32635"}}'
-        hint = "left out when the log was made by hand, or recordings: name the files with --log"
-        return fail(InputError, str(path), expected, got, hint)
-    if path.is_file():
-        hint = "name the folder that it lies in"
-        if path.stem not in TABLES and path.name != HEAD:
-            hint = f"convert it first: mapfilter convert {path.name} --out LOG"
-        return fail(InputError, str(path), expected, "a file", hint)
-    if path.is_dir():
-        hint = (
-            "a radio-route database, which --db names"
-            if (path / "points.parquet").is_file()
-            else ""
-        )
-        if inner := sorted(path.glob(f"*/*/{HEAD}"))[:1]:
-            hint = f"the logs are in {inner[0].parent.parent}"
-        return fail(InputError, str(path), expected, "a folder without any", hint)
-    return fail(InputError, str(path), expected, "nothing", likely_of_no_file(path))
 
 
 def _check_head(head: dict[str, Any], where: str) -> float:

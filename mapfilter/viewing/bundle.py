@@ -22,7 +22,7 @@ from mapfilter.radio.cells import CellPlan
 from mapfilter.roads.ways import Bounds
 from mapfilter.viewing.explain import TERMS
 from mapfilter.viewing.ground import ViewFrame, background, cells_of, empty_background, level_fields
-from mapfilter.viewing.here import constants
+from mapfilter.viewing.page_constants import constants
 from mapfilter.viewing.readings import REASONS, LevelAt, level_on
 from mapfilter.viewing.runs import STATUSES, ViewedRun, run_of, thresholds, tracks_bounds
 from mapfilter.viewing.words import REASONS as WORDS

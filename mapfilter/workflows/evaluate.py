@@ -33,8 +33,11 @@ from mapfilter.experiments.sweep.world import SweepWorld, write_world
 from mapfilter.propagation.models import GroundTruthErrors, PredictionModel
 from mapfilter.propagation.predict import predict
 from mapfilter.propagation.shadowing import named_rng
+from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
+from mapfilter.report.basemap import BaseMap
+from mapfilter.roads.lattice import RouteLattice
 from mapfilter.roads.network import street_network
 from mapfilter.simulation.reflections import NlosModel
 from mapfilter.simulation.satellites import ReceptionModel
@@ -185,16 +188,22 @@ def run_global_positioning(
     world, points = _world(area, out / "world", seed)
     city = PlainCity(world, seed)
     integrity = config.integrity.of(IntegrityOptions)
-    drawn = pictures and config.output.pictures != "none"
     found = run_cases(
         Batch(city, choice, wanted, 0, runs, fixed, integrity),
         out,
         workers=workers,
         resume=resume,
         progress=progress,
-        base=street_base(city.streets, area.streets.attribution) if drawn else None,
+        base=ground(area, city.streets) if pictures else None,
     )
     return written(config, seed, points, found, began_s, out)
+
+
+def ground(area: World, streets: SweepWorld) -> BaseMap | None:
+    """Return what the pictures of a benchmark are drawn on; None where none are wanted."""
+    if area.config.output.pictures == "none":
+        return None
+    return street_base(streets, area.streets.attribution)
 
 
 def written(
@@ -207,6 +216,22 @@ def written(
     return result
 
 
+def build_as_set(
+    config: Config, rasters: Path, plan: CellPlan, routes: RouteLattice, folder: Path
+) -> int:
+    """Build a database of rasters by the settings of a configuration; return its points."""
+    database = build(
+        open_rasters(rasters),
+        plan,
+        routes,
+        folder,
+        margin_db=config.database.margin_db,
+        floor_dbm=config.database.floor_dbm,
+        tile_px=config.database.tile_px,
+    )
+    return int(database.manifest["counts"]["points"])
+
+
 def _world(world: World, folder: Path, seed: int) -> tuple[BenchmarkWorld, int]:
     """Predict the cells, and build a database of all ways and one that lacks every tenth."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -215,21 +240,10 @@ def _world(world: World, folder: Path, seed: int) -> tuple[BenchmarkWorld, int]:
     rasters_path = folder / "rxlev.tif"
     levels = predict(world.plan, world.lattice, world.heights_m, model, antennas=antennas)
     write_rasters(rasters_path, world.lattice, levels, world.plan.ids)
-    rasters = open_rasters(rasters_path)
     rng = named_rng(seed, "missing ways")
     thinned = without_ways(world.routes, world.ways, _MISSING, config.roads.half_width_m, rng)
-    count = 0
-    for name, routes in ((FULL, world.routes), (THINNED, thinned)):
-        database = build(
-            rasters,
-            world.plan,
-            routes,
-            folder / name,
-            margin_db=config.database.margin_db,
-            floor_dbm=config.database.floor_dbm,
-            tile_px=config.database.tile_px,
-        )
-        count = count or int(database.manifest["counts"]["points"])
+    count = build_as_set(config, rasters_path, world.plan, world.routes, folder / FULL)
+    build_as_set(config, rasters_path, world.plan, thinned, folder / THINNED)
     write_buildings(world.buildings, folder / BUILDINGS)
     network = street_network(world.ways, world.routes)
     streets = SweepWorld(network, world.plan, world.lattice, {}, world.heights_m)

@@ -55,7 +55,7 @@ def run_info(path: Path) -> dict[str, Any]:
         raise fail(InputError, str(path), "a file or folder", "a device or pipe")
     if (path / MANIFEST).exists():
         return {"kind": "database", **info(open_database(path, verify="full"))}
-    from mapfilter.tracks.store import is_log
+    from mapfilter.tracks.log_folders import is_log
 
     if is_log(path):
         return _log_info(path)
@@ -101,7 +101,7 @@ def _file_info(path: Path) -> dict[str, Any]:
 
         box = dict(zip(("west", "south", "east", "north"), map_bounds_deg(path), strict=True))
         return {"kind": "map", "bounds_deg": box, "bytes": path.stat().st_size, "use": "area.map"}
-    from mapfilter.tracks.store import is_log
+    from mapfilter.tracks.log_folders import is_log
 
     if is_log(path.parent):
         hint = "a part of a log; name the folder that it lies in"

@@ -22,8 +22,8 @@ from mapfilter.propagation.remarks import (
     outside_validity,
     upward_tilts,
 )
-from mapfilter.radio.cells import write_cell_plan
 from mapfilter.radio.far_cells import check_cells_near
+from mapfilter.radio.plan_files import write_cell_plan
 from mapfilter.radio.plan_notes import carrier_notes
 from mapfilter.rasters.geotiff_writer import is_as_written, write_rasters
 from mapfilter.rasters.opening import open_rasters

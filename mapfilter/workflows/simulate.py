@@ -19,7 +19,8 @@ from mapfilter.simulation.reports import ReportModel
 from mapfilter.simulation.simulate import SimulationSettings, simulate_journeys
 from mapfilter.simulation.walking import WalkerModel, inside_buildings
 from mapfilter.tracks.imu_noise import ImuNoise
-from mapfilter.tracks.store import check_log_replaceable, is_log, write_log
+from mapfilter.tracks.log_folders import is_log
+from mapfilter.tracks.store import check_log_replaceable, write_log
 from mapfilter.workflows.inputs.world import planned_rasters, raster_cover, raster_world
 from mapfilter.workflows.predict import open_ground_truth
 

@@ -17,7 +17,8 @@ from mapfilter.database.floor import floor_of
 from mapfilter.database.measured import Readings
 from mapfilter.database.measured_files import readings_parquet
 from mapfilter.errors import ConfigError, fail, listed
-from mapfilter.radio.cells import CellPlan, write_cell_plan
+from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.plan_files import write_cell_plan
 from mapfilter.rasters.geotiff import READINGS_TAG
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import RxLevRasters

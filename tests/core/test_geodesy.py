@@ -13,9 +13,9 @@ from mapfilter.angles import (
     wrap_one_rad,
     wrap_rad,
 )
+from mapfilter.degrees import check_bbox
 from mapfilter.errors import InputError
 from mapfilter.geodesy import (
-    check_bbox,
     grid_convergence_rad,
     project,
     projected_crs,

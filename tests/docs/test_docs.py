@@ -1,12 +1,15 @@
 """The documentation's examples run, and what it lists is what the program has."""
 
 import doctest
+import inspect
 import re
 import shlex
 import shutil
 import textwrap
 import tomllib
 from dataclasses import fields
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +18,7 @@ import typer
 from pydantic import BaseModel
 from typer.testing import CliRunner
 
+import mapfilter as mf
 from mapfilter.check.findings import REMEDIES
 from mapfilter.cli import app
 from mapfilter.config.load import load_config
@@ -54,6 +58,25 @@ def test_examples_of_each_page(name):
         str(DOCS / name), module_relative=False, encoding="utf-8", verbose=False
     )
     assert failed == 0
+
+
+def test_all_that_pages_import_is_there():
+    """Also in scripts, which the tests compile and do not run."""
+    shown = [
+        (module, name)
+        for path in [*PAGES, Path("..") / "README.md"]
+        for module, one, several in re.findall(
+            r"from (mapfilter[\w.]*) import (?:([\w, ]+)|\(([^)]+)\))", page(str(path))
+        )
+        for name in re.findall(r"\w+", re.sub(r" as \w+", "", one or several))
+    ]
+    assert len(shown) > 100
+    missing = [(module, name) for module, name in shown if not _has_name(module, name)]
+    assert missing == []
+
+
+def _has_name(module: str, name: str) -> bool:
+    return hasattr(import_module(module), name) or find_spec(f"{module}.{name}") is not None
 
 
 def test_the_quickstart_has_examples():
@@ -298,6 +321,16 @@ def test_recordings_page_lists_every_format_with_an_example():
     listed = named(page("file-formats.rst"))
     assert {column for columns in SENSOR_COLUMNS.values() for column in columns} <= listed
     assert set(SENSOR_COLUMNS) <= listed
+
+
+def test_the_reference_lists_every_name_of_the_front_door_with_its_page():
+    links = dict(re.findall(r":(?:class|func):`(\w+) <([\w.]+)>`", page("api.rst")))
+    assert sorted(links) == sorted(mf.__all__)
+    for name, target in links.items():
+        module, _, short = target.rpartition(".")
+        here = getattr(import_module(module), short)
+        assert short == name
+        assert inspect.unwrap(getattr(mf, name)) is inspect.unwrap(here)
 
 
 def test_reference_lists_every_package_or_says_that_it_is_internal():

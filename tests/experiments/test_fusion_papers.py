@@ -5,7 +5,6 @@ import pytest
 
 from mapfilter.errors import ConfigError
 from mapfilter.evaluation.bounds import bound_of, rmse_over_time
-from mapfilter.experiments.papers import zhang_2006 as zhang
 from mapfilter.experiments.papers.fritsche_klein_2009.paper import TABLE_III, bound_curves
 from mapfilter.experiments.papers.fritsche_klein_2009.scene import (
     COMBINATIONS,
@@ -15,6 +14,8 @@ from mapfilter.experiments.papers.fritsche_klein_2009.scene import (
     scene,
 )
 from mapfilter.experiments.papers.paper import true_states
+from mapfilter.experiments.papers.zhang_2006 import scene as zhang
+from mapfilter.experiments.papers.zhang_2006.paper import STEPS
 from mapfilter.filters.gaussian import EKF, RBUKF
 from mapfilter.filters.gaussian_sum import run_mixtures, split
 from mapfilter.filters.kalman import smooth
@@ -30,7 +31,7 @@ PCRLB = {
 
 
 def zhang_states(trials, rng):
-    return true_states(zhang.MOTION, np.array(zhang.START), trials, zhang.STEPS, rng)
+    return true_states(zhang.MOTION, np.array(zhang.START), trials, STEPS, rng)
 
 
 def drawn(name, trials, seed=1, layout=None):

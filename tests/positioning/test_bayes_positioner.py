@@ -1,8 +1,10 @@
 """Single steps of the map filter: what starts it, what is reported, and what is left out."""
 # ruff: noqa: ARG002
 
+import sys
 from dataclasses import replace
 from math import inf, log, nan, sqrt
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -237,6 +239,17 @@ def test_what_is_weighed_at_an_epoch_may_be_asked_for():
     # A fix that repeats itself is none.
     again = POSITIONER.evidence_at(replace(begun, last_fix=FIX), epoch, rng())[1]
     assert again[0].terms == ()
+
+
+@pytest.mark.parametrize(
+    "kernel",
+    ["models.street_motion._move", "positioning.bayes.beliefs.model.weigh_by_ways"],
+)
+def test_kernels_of_motion_are_loaded_although_a_first_step_waits(kernel):
+    module, _, name = f"mapfilter.{kernel}".rpartition(".")
+    with patch.object(sys.modules[module], name, wraps=getattr(sys.modules[module], name)) as asked:
+        replace(POSITIONER).warm_up(())
+    assert asked.called
 
 
 def test_kernels_are_loaded_before_particles_move_and_for_no_grid():

@@ -8,6 +8,7 @@ from math import isfinite, nan
 import numpy as np
 import pytest
 from made_town import CRS, NAMES, SOUTH_M, WEST_M, Town, walk_log
+from report_terms import Place, Report, report_terms
 from scipy.special import logsumexp
 
 from mapfilter.filters.belief_models import Cloud
@@ -24,7 +25,7 @@ from mapfilter.positioning.merging import epochs
 from mapfilter.radio.cells import CellPlan
 from mapfilter.viewing import explain as module
 from mapfilter.viewing.explain import explain
-from mapfilter.viewing.here import Place, Report, constants, report_terms
+from mapfilter.viewing.page_constants import constants
 from mapfilter.viewing.trace import Thinned, TraceRecorder, density
 
 TOWN = Town.of(1)

@@ -1,6 +1,7 @@
 """How an epoch's motion moves beliefs, alternatives, twins and turned phones, with made filters."""
 # ruff: noqa: ARG002
 
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from math import inf, isnan, nan, pi
 from types import SimpleNamespace
@@ -25,7 +26,11 @@ from mapfilter.positioning.sensors.pace import Pace
 from mapfilter.positioning.sensors.rest import Rest
 from mapfilter.positioning.sensors.watch import SensorWatch
 
-CHANGES = ("carried_on", "turned_at_jump", "remounted")
+CHANGES = {
+    "moving": ("carried_on",),
+    "belief_set": ("turned_at_jump", "remounted"),
+}
+"""Changes of beliefs that are noted alone, by the modules that ask for them."""
 SEARCHING, TRACKING = Status.SEARCHING, Status.TRACKING
 FIX = GnssFix(0.0, 0.0)
 STEP = MotionStep(2.0, 0.5, 0.1, sampling_sd_m=0.25)
@@ -112,8 +117,11 @@ def walking(main=None, *, status=TRACKING, stepped_s=9.0, **more):
 
 
 def moved_by(beliefs, *given):
-    changes = {name: getattr(beliefs, name) for name in CHANGES}
-    with patch.multiple("mapfilter.positioning.bayes.beliefs.moving", **changes):
+    with ExitStack() as patches:
+        for module, names in CHANGES.items():
+            changes = {name: getattr(beliefs, name) for name in names}
+            where = f"mapfilter.positioning.bayes.beliefs.{module}"
+            patches.enter_context(patch.multiple(where, **changes))
         return moved(beliefs, *given)
 
 

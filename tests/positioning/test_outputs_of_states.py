@@ -10,7 +10,8 @@ import pytest
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import BeliefSummary
 from mapfilter.positioning.bayes.beliefs.legs import NO_LEG
-from mapfilter.positioning.bayes.state import BayesState, step_output
+from mapfilter.positioning.bayes.outputs import step_output
+from mapfilter.positioning.bayes.state import BayesState
 
 AREA = SimpleNamespace(origin_m=(1000.0, 2000.0), matched_way=lambda *_: (7, 0.75))
 PLACES = np.array([[30.0, 31.0, 29.0], [40.0, 40.0, 41.0]], dtype=np.float32)

@@ -14,7 +14,7 @@ import mapfilter as mf
 from mapfilter.errors import ConfigError
 from mapfilter.lattice import Lattice
 from mapfilter.options import Options
-from mapfilter.radio.cells import write_cell_plan
+from mapfilter.radio.plan_files import write_cell_plan
 from mapfilter.roads.osm import read_ways
 from mapfilter.roads.routes import read_roads
 
@@ -29,6 +29,7 @@ NAMES_ALONE = {
     ("read_log", "paths"),
     ("read_log", "truth"),
     ("sweep", "filters"),
+    ("write_rasters", "items"),
 }
 """Of what is given for "a" they use the name, or say what is wrong in words of their own."""
 
@@ -73,6 +74,11 @@ def good(tmp_path_factory):
         "sweep": world | {"database": database, "filters": {"a": "bayes"}},
         "write_estimate": {"track": located, "path": folder / "track.parquet"},
         "write_log": {"log": log, "folder": folder / "log"},
+        "write_rasters": {
+            "path": folder / "new.tif",
+            "lattice": LATTICE,
+            "items": {"a": np.zeros((LATTICE.rows, LATTICE.cols))},
+        },
     }
 
 

@@ -8,8 +8,8 @@ from fuzz import fuzz
 
 from mapfilter.errors import ConfigError, InputError
 from mapfilter.geodesy import project
-from mapfilter.radio.cells import CellPlan, write_cell_plan
-from mapfilter.radio.plan_files import read_cell_plan
+from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.plan_files import read_cell_plan, write_cell_plan
 
 CRS = "EPSG:32635"
 DEFAULTS = {"height_m": 25.0, "eirp_dbm": 52.0, "frequency_mhz": 1800.0}

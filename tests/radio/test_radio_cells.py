@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import project, unproject
-from mapfilter.radio.cells import Cell, CellPlan, write_cell_plan
-from mapfilter.radio.plan_files import read_cell_plan
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.radio.plan_files import read_cell_plan, write_cell_plan
 
 CRS = "EPSG:32635"
 HEADER = "cell,site,lat,lon,height_m,azimuth_deg,eirp_dbm,frequency_mhz,arfcn,bsic\n"

@@ -9,8 +9,8 @@ import pytest
 
 from mapfilter.database.store import read_cells, write_cells
 from mapfilter.errors import InputError
-from mapfilter.radio.cells import CellPlan, write_cell_plan
-from mapfilter.radio.plan_files import read_cell_plan
+from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.plan_files import read_cell_plan, write_cell_plan
 
 CRS = "EPSG:32635"
 PLACE = "60.17,24.94,30,,50,1800"

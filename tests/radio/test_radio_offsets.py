@@ -3,8 +3,7 @@
 import pytest
 
 from mapfilter.errors import InputError
-from mapfilter.radio.cells import write_cell_plan
-from mapfilter.radio.plan_files import read_cell_plan
+from mapfilter.radio.plan_files import read_cell_plan, write_cell_plan
 
 CRS = "EPSG:32635"
 HEADER = "TX_ID;SITE_NAME;X;Y;DX;DY;HEIGHT;AZIMUT;EIRP;FREQUENCY\n"

@@ -91,6 +91,17 @@ def test_levels_by_cell_need_no_list_of_cells(tmp_path):
     assert open_rasters(tmp_path / "y.tif").read(None, ["B", "A"]).tolist() == found.read().tolist()
 
 
+def test_one_array_of_all_cells_is_in_their_order(tmp_path):
+    levels_dbm = -80.0 - np.arange(12.0).reshape(2, 2, 3)
+    path = write_rasters(tmp_path / "x.tif", SMALL, levels_dbm, ("B", "A"))
+    assert path == tmp_path / "x.tif"
+    found = open_rasters(path)
+    assert (found.cell_ids, found.crs) == (("B", "A"), SMALL.crs)
+    assert found.read().tolist() == levels_dbm.tolist()
+    write_rasters(tmp_path / "y.tif", SMALL, {"B": levels_dbm[0], "A": levels_dbm[1]})
+    assert (tmp_path / "y.tif").read_bytes() == path.read_bytes()
+
+
 @pytest.mark.parametrize(
     ("items", "ids", "expected"),
     [
@@ -101,7 +112,11 @@ def test_levels_by_cell_need_no_list_of_cells(tmp_path):
         ),
         ([("A", np.zeros((2, 3)))], None, "cell_ids: expected the ids of all cells, found none"),
         ({}, None, "cell_ids: expected the ids of all cells, found none"),
-        (np.zeros((1, 2, 3)), ["A"], "band 1: expected a cell id and its array, found ndarray"),
+        ([np.zeros((2, 3))], ["A"], "band 1: expected a cell id and its array, found ndarray"),
+        (np.zeros((1, 2, 3)), None, "cell_ids: expected the ids of all cells, found none"),
+        (np.zeros((1, 2, 3)), ["A", "B"], r"items: expected \(2, 2, 3\): cells, rows, columns"),
+        (np.zeros((1, 3)), ["A"], r"items: expected \(1, 2, 3\): cells, rows, columns, found"),
+        (np.zeros((1, 3, 2)), ["A"], r"band 1 \(A\): expected 2 x 3 pixels, found \(3, 2\)"),
         ({"A": [["x"] * 3] * 2}, None, r"band 1 \(A\): expected rows of numbers, found list"),
         ({"A": [[1, 2, 3], [4, 5]]}, None, r"band 1 \(A\): expected rows of numbers, found list"),
     ],

@@ -10,8 +10,8 @@ from test_survey_fit import ANTENNA, CRS, LATTICE, law, measured, shadowed, some
 
 from mapfilter.errors import InputError
 from mapfilter.lattice import Lattice
-from mapfilter.radio.cells import Cell, CellPlan, write_cell_plan
-from mapfilter.radio.plan_files import read_cell_plan
+from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.radio.plan_files import read_cell_plan, write_cell_plan
 from mapfilter.rasters.geotiff_writer import write_rasters
 from mapfilter.rasters.opening import open_rasters
 from mapfilter.rasters.raster_set import check_against_plan

@@ -6,8 +6,9 @@ import pytest
 
 from mapfilter.errors import InputError
 from mapfilter.tracks.log import make_log
+from mapfilter.tracks.log_folders import list_logs
 from mapfilter.tracks.schema import TABLES
-from mapfilter.tracks.store import list_logs, read_log, write_log
+from mapfilter.tracks.store import read_log, write_log
 
 CRS = "EPSG:32629"
 

@@ -17,8 +17,9 @@ from mapfilter.errors import InputError, OutputError, StoreError
 from mapfilter.tracks.imu_noise import ImuNoise
 from mapfilter.tracks.kinds import leave_out
 from mapfilter.tracks.log import make_log
+from mapfilter.tracks.log_folders import is_log, list_logs
 from mapfilter.tracks.schema import MISSING_SIGNS, TABLES
-from mapfilter.tracks.store import is_log, list_logs, read_log, write_log
+from mapfilter.tracks.store import read_log, write_log
 
 CRS = "EPSG:32629"
 

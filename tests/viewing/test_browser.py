@@ -9,9 +9,9 @@ import made_bundle as made
 import numpy as np
 import pytest
 from browser import Watched, opened
+from report_terms import Place, Report, report_terms
 
 from mapfilter.viewing.arrays import packed, places, starts, unpacked
-from mapfilter.viewing.here import Place, Report, report_terms
 from mapfilter.viewing.page import write_page
 
 NAMELESS = """[...document.querySelectorAll('button, select, input, [role=application]')]

@@ -5,8 +5,9 @@ from command_line import mapfilter
 
 from mapfilter._area_scale import check_scale
 from mapfilter.config.load import load_config
+from mapfilter.degrees import check_bbox
 from mapfilter.errors import InputError
-from mapfilter.geodesy import check_bbox, project
+from mapfilter.geodesy import project
 from mapfilter.workflows.inputs.area_lattice import area_lattice
 
 ACROSS = "area.bbox: expected an area on one side of 180° of longitude, found "

@@ -25,7 +25,8 @@ from command_line import (
 )
 
 from mapfilter.rasters.opening import open_rasters
-from mapfilter.tracks.store import list_logs, read_log
+from mapfilter.tracks.log_folders import list_logs
+from mapfilter.tracks.store import read_log
 
 
 def test_own_rasters_that_were_edited_are_not_predicted_anew(own_world):

@@ -8,7 +8,7 @@ import pytest
 from command_line import mapfilter
 from made_recordings import MADE
 
-from mapfilter.tracks.store import is_log
+from mapfilter.tracks.log_folders import is_log
 
 PAGE = Path(__file__).parents[2] / "docs" / "howto" / "recordings.rst"
 EXAMPLES = dict(

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 PAPERS = {
     "khalaf-allah-2007": "khalaf_allah_2007",
     "fritsche-klein-2009": "fritsche_klein_2009.paper",
-    "zhang-2006": "zhang_2006",
+    "zhang-2006": "zhang_2006.paper",
     "tesa": "tesa.paper",
     "dlr": "dlr.paper",
 }

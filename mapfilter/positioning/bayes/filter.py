@@ -30,6 +30,7 @@ from mapfilter.positioning.bayes.claims import judged
 from mapfilter.positioning.bayes.clock_check import with_clocks_checked
 from mapfilter.positioning.bayes.doubted import doubted
 from mapfilter.positioning.bayes.maker import Maker
+from mapfilter.positioning.bayes.outputs import step_output
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeRules
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules, PullRules
 from mapfilter.positioning.bayes.rivals.transitions import report
@@ -38,7 +39,7 @@ from mapfilter.positioning.bayes.sources.map_source import MapSource
 from mapfilter.positioning.bayes.sources.radio import RadioSource
 from mapfilter.positioning.bayes.sources.timing import TimingSource
 from mapfilter.positioning.bayes.sources.usable import UsableEpoch, usable_epoch
-from mapfilter.positioning.bayes.state import BayesState, belief_here, check_state, step_output
+from mapfilter.positioning.bayes.state import BayesState, belief_here, check_state
 from mapfilter.positioning.bayes.waiting import waits
 from mapfilter.positioning.bayes.warm_up import run_kernels
 from mapfilter.positioning.bayes.weighing import Weighing
@@ -63,7 +64,7 @@ _POSITIONS = frozenset[Kind]({"gnss", "pseudorange"})
 _TOLD_ELSEWHERE = (Reason.USED, Reason.NOT_MOVED_ENOUGH, Reason.NO_READING, Reason.STALE_RADIO)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BayesPositioner(Filter[BayesState]):
     """The map filter over an area.
 

@@ -25,6 +25,7 @@ from mapfilter.positioning.bayes.over_survey import (
     filled_field,
     over_measured,
 )
+from mapfilter.positioning.filter import check_over
 
 VEHICLE: Mapping[str, float] = {
     "step_sd_m": 0.05,
@@ -157,6 +158,7 @@ class BayesFilter(Options):
         Over surveyed levels, options that have their defaults are those of measured maps
         (:mod:`mapfilter.positioning.bayes.over_survey`).
         """
+        check_over(self, database)
         measured = database.measured()
         if measured is None:
             return self.over_area(open_area(database, whole=self.name == "grid"))

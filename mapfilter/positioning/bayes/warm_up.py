@@ -23,7 +23,7 @@ def run_kernels(small: BayesPositioner) -> None:
     west, south = area.origin_m
     state = small.begin_at(west, south, 1.0, rng)
     step = MotionStep(1.0, 0.0)
-    # The step waits, and the position goes on by dead reckoning.
+    # The step waits, and the position goes on by dead reckoning: only `predict` moves something.
     state, _ = small.step(state, Epoch(0.0, (step,)), rng)
     if state.belief is not None:
         small.beliefs.by_compass[True].predict(state.belief, step, rng)

@@ -25,7 +25,7 @@ from mapfilter.positioning.epoch_checks import (
 )
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import TrackEstimate
-from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind
+from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind, check_over
 from mapfilter.positioning.kalman.belief import FusionHistory
 from mapfilter.positioning.kalman.lasting import extended_layout
 from mapfilter.positioning.kalman.level_errors import MOST_CELLS, CellSlots, with_levels
@@ -65,6 +65,7 @@ class KalmanFilter(KalmanOptions):
 
     def over(self, database: RadioRouteDatabase, *, ways: bool = True) -> KalmanTracker:  # noqa: ARG002
         """Return the filter over the sites of a database."""
+        check_over(self, database)
         return self.over_sites(database.plan)
 
     def over_sites(
@@ -75,7 +76,7 @@ class KalmanFilter(KalmanOptions):
         return KalmanTracker(sites, METHODS[self.method], self.smooth)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class KalmanTracker(Filter[KalmanState]):
     """A Kalman-type filter over the sites of a cell plan."""
 

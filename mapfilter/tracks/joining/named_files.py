@@ -7,8 +7,8 @@ from math import isfinite
 from pathlib import Path
 
 from mapfilter.errors import Faults, listed
+from mapfilter.tracks.log_folders import files_in, is_log
 from mapfilter.tracks.readers.texts.zipped import files_in_zip, is_zip
-from mapfilter.tracks.store import files_in, is_log
 
 _MOST_S = 1e10
 

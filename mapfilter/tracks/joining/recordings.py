@@ -9,13 +9,13 @@ from pathlib import Path
 
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail, listed
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.log_folders import files_in, is_log
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.readers.clocks.local_times import parse_zone
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import format_of, read_recording
 from mapfilter.tracks.readers.recorded.recording import Recording
 from mapfilter.tracks.readers.texts.zipped import check_zipped, files_in_zip, is_zip
-from mapfilter.tracks.store import files_in, is_log
 
 
 def read_recordings(

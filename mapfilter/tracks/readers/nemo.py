@@ -52,8 +52,8 @@ from mapfilter.tracks.readers.plain_csv import has_content
 from mapfilter.tracks.readers.recorded.identities import add_radio, available
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.recorded.recording import Clock
-from mapfilter.tracks.readers.texts.columns import only
 from mapfilter.tracks.readers.texts.events import Events, read_events
+from mapfilter.tracks.readers.texts.kept_rows import only
 from mapfilter.tracks.readers.texts.separated_values import header_names, likely_separator
 from mapfilter.tracks.readers.texts.text import Text
 

@@ -15,7 +15,8 @@ from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recorded.identities import add_radio, parse_identities
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.recorded.recording import Clock
-from mapfilter.tracks.readers.texts.columns import Columns, changed_rows, only
+from mapfilter.tracks.readers.texts.columns import Columns
+from mapfilter.tracks.readers.texts.kept_rows import changed_rows, only
 from mapfilter.tracks.readers.texts.separated_values import (
     header_columns,
     header_names,

@@ -1,6 +1,6 @@
 "use strict";
 // A radio report by itself at any place: the filter's equations for one report, nothing known of the cells' errors.
-// The same as mapfilter.viewing.here.report_terms; a test compares both.
+// The same as report_terms of tests/report_terms.py; a test compares both.
 (() => {
   const ROOT_PI = Math.sqrt(Math.PI);
 

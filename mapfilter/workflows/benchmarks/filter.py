@@ -40,7 +40,8 @@ from mapfilter.positioning.bayes.sources.evidence import RadioReading
 from mapfilter.positioning.loop import locate
 from mapfilter.positioning.merging import epochs
 from mapfilter.tracks.log import TrackLog
-from mapfilter.tracks.store import list_logs, read_log
+from mapfilter.tracks.log_folders import list_logs
+from mapfilter.tracks.store import read_log
 from mapfilter.workflows.bench import median_seconds
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.predict import run_predict

@@ -16,7 +16,6 @@ from mapfilter._parallel import Progress
 from mapfilter._types import Floats
 from mapfilter.config.load import given_keys
 from mapfilter.config.sections import Config
-from mapfilter.database.build import build
 from mapfilter.errors import ConfigError, Faults
 from mapfilter.evaluation.stanford import IntegrityOptions
 from mapfilter.experiments.benchmarks.foreign import (
@@ -36,7 +35,6 @@ from mapfilter.propagation.models import PredictionModel
 from mapfilter.propagation.predict import predict
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.rasters.geotiff_writer import write_rasters
-from mapfilter.rasters.opening import open_rasters
 from mapfilter.roads.network import street_network
 from mapfilter.roads.route_points import inside_areas
 from mapfilter.simulation.level_samplers import array_sampler
@@ -46,8 +44,14 @@ from mapfilter.simulation.worlds.radio import planners_offsets_db
 from mapfilter.simulation.worlds.sensor_faults import NO_FAULT
 from mapfilter.simulation.worlds.street_lines import StreetLines
 from mapfilter.tracks.store import write_log
-from mapfilter.workflows.evaluate import EvaluateResult, check_names, written
-from mapfilter.workflows.evaluations.runs import run_cases, street_base
+from mapfilter.workflows.evaluate import (
+    EvaluateResult,
+    build_as_set,
+    check_names,
+    ground,
+    written,
+)
+from mapfilter.workflows.evaluations.runs import run_cases
 from mapfilter.workflows.evaluations.settings import load_benchmark
 from mapfilter.workflows.inputs.filter_choice import filter_choice
 from mapfilter.workflows.inputs.world import World
@@ -139,14 +143,13 @@ def run_foreign(
     if "length_m" in fixed:
         made = replace(made, length_m=config.journeys.length_m)
     integrity = config.integrity.of(IntegrityOptions)
-    drawn = config.output.pictures != "none"
     found = run_cases(
         Batch(made, choice, wanted, 0, runs, fixed, integrity),
         out,
         workers=workers,
         resume=resume,
         progress=progress,
-        base=street_base(made.streets, area.streets.attribution) if drawn else None,
+        base=ground(area, made.streets),
         pooled=frozenset(SENSORS) - {NO_FAULT},
     )
     return written(config, seed, points, found, began_s, out)
@@ -250,16 +253,7 @@ def _database(world: World, given: GivenInputs, folder: Path, seed: int, variant
             routes, world.ways, share, half_m, named_rng(seed, "missing ways", str(variant))
         )
         write_json(missing_ways_file(folder), {"missing": gone.tolist()})
-    database = build(
-        open_rasters(rasters_path),
-        given.plan,
-        routes,
-        folder,
-        margin_db=config.database.margin_db,
-        floor_dbm=config.database.floor_dbm,
-        tile_px=config.database.tile_px,
-    )
-    return int(database.manifest["counts"]["points"])
+    return build_as_set(config, rasters_path, given.plan, routes, folder)
 
 
 def _drive_test(world: World, streets: StreetLines, seed: int) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from mapfilter.config.fields import Section
 from mapfilter.config.sections import Config
 from mapfilter.database.manifest import MANIFEST, POINTS
 from mapfilter.errors import ConfigError, Faults, OutputError, fail
-from mapfilter.tracks.store import has_tables, is_log
+from mapfilter.tracks.log_folders import has_tables, is_log
 
 _ALSO_WRITTEN = (
     "output.dir",

@@ -7,8 +7,9 @@ import numpy as np
 from mapfilter._area_scale import check_scale
 from mapfilter.config.inputs import Area
 from mapfilter.config.sections import Config
+from mapfilter.degrees import check_bbox
 from mapfilter.errors import ConfigError, Faults, InputError, fail
-from mapfilter.geodesy import check_bbox, project, projected_crs, utm_crs
+from mapfilter.geodesy import project, projected_crs, utm_crs
 from mapfilter.lattice import Lattice
 from mapfilter.roads.maps import check_on_map, map_bounds_deg
 from mapfilter.roads.raster import raster_lattice

@@ -22,6 +22,7 @@ from mapfilter.positioning.fingerprints.tables import read_fingerprint_table
 from mapfilter.radio.cells import CellPlan
 from mapfilter.tracks.checks.range_units import with_range_notes
 from mapfilter.tracks.log import TrackLog
+from mapfilter.tracks.log_folders import is_log
 from mapfilter.tracks.open_log import list_journeys, open_log
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions
 from mapfilter.tracks.readers import plain_csv
@@ -29,7 +30,6 @@ from mapfilter.tracks.readers.formats import find_format, format_of
 from mapfilter.tracks.readers.plain.fields import FIELDS
 from mapfilter.tracks.readers.texts.separated_values import header_names, likely_separator
 from mapfilter.tracks.readers.texts.text import read_text
-from mapfilter.tracks.store import is_log
 
 _PEEKED_BYTES = 1 << 18
 WITHOUT_STEPS = OpenOptions(combine=CombineOptions(walk=None))

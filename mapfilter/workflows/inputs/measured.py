@@ -14,10 +14,11 @@ from mapfilter.geodesy import unproject
 from mapfilter.radio.identities import IDENTITY
 from mapfilter.survey.measurement_rows import NotMeasurementsError, Rows
 from mapfilter.tracks.checks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
+from mapfilter.tracks.log_folders import is_log
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import format_of, read_recording
 from mapfilter.tracks.schema import SERVING, TABLES
-from mapfilter.tracks.store import is_log, read_log
+from mapfilter.tracks.store import read_log
 
 _LONGEST_S = 10.0
 _CODE_REACH_M, _M_PER_DEG = 2000.0, 111_320.0

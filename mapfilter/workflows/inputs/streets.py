@@ -29,7 +29,7 @@ from mapfilter.roads.ways import Bounds, Buildings, Water, Ways, clip_ways
 from mapfilter.simulation.synthetic_city import SyntheticCity, manhattan, synthetic_city
 from mapfilter.survey.measurements import Measurements
 from mapfilter.survey.read_measurements import read_measurements
-from mapfilter.tracks.store import is_log
+from mapfilter.tracks.log_folders import is_log
 from mapfilter.workflows.inputs.area_lattice import area_lattice
 from mapfilter.workflows.inputs.measured import recorded_rows
 

@@ -10,27 +10,13 @@ import numpy as np
 
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.positioning.bayes.beliefs.belief_changes import (
-    assumed,
-    carried_on,
-    counted_from,
-    moved_as_read,
-    remounted,
-    turned_at_jump,
-)
+from mapfilter.positioning.bayes.beliefs.belief_changes import carried_on
 from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.beliefs.belief_set import BeliefSet
 from mapfilter.positioning.bayes.beliefs.legs import NO_LEG, Leg, may_wait
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning, RecentPath
-from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, MapBelief
-from mapfilter.positioning.bayes.rivals.half_turns import HalfTurns
-from mapfilter.positioning.bayes.rivals.held import (
-    HeldOtherwise,
-    as_measured,
-    forked,
-    jumps,
-    still_open,
-)
-from mapfilter.positioning.bayes.rivals.mirrored import MirroredTwin, mirrored_step
+from mapfilter.positioning.bayes.rivals.alternative import MapBelief
+from mapfilter.positioning.bayes.rivals.held import as_measured, jumps
 from mapfilter.positioning.bayes.rivals.own_draws import OwnDraws
 from mapfilter.positioning.bayes.rivals.unaided import without_positions
 from mapfilter.positioning.bayes.state import BayesState
@@ -41,7 +27,7 @@ from mapfilter.positioning.step_output import UnusedReading
 
 
 def moved(
-    beliefs: BeliefFilters,
+    filters: BeliefFilters,
     state: BayesState,
     watch: SensorWatch,
     epoch: Epoch,
@@ -52,7 +38,7 @@ def moved(
 
     Parameters
     ----------
-    beliefs : BeliefFilters
+    filters : BeliefFilters
         Filters of single beliefs.
     state : BayesState
         After the epoch before.
@@ -72,9 +58,9 @@ def moved(
         Motion that was not used.
     """
     rested = state.watch.rest if watch.rest is None else None
-    if beliefs.may_be_anywhere(state, watch, epoch.time_s):
+    if filters.may_be_anywhere(state, watch, epoch.time_s):
         state = state.begun_anew()
-    move = _Move.of(beliefs, state, epoch, rng, gathers=waits is not None)
+    move = _Move.of(filters, state, epoch, rng, gathers=waits is not None)
     move.begin_rivals()
     if rested is not None:
         move.carry_on(rested)
@@ -89,7 +75,7 @@ def moved(
 class _Move:
     """What the motion of an epoch changes, row by row; ``state`` is that before the motion."""
 
-    beliefs: BeliefFilters
+    filters: BeliefFilters
     state: BayesState
     epoch: Epoch
     rng: np.random.Generator
@@ -98,12 +84,7 @@ class _Move:
     ranged: bool
     positioned: bool
     by_course: bool
-    belief: MapBelief | None
-    alternative: AlternativeHypothesis | None
-    twin: MirroredTwin | None
-    held: tuple[HeldOtherwise, ...]
-    half_turns: HalfTurns
-    unaided: tuple[HeldOtherwise, ...]
+    beliefs: BeliefSet
     leg: Leg
     reckoning: DeadReckoning
     path: RecentPath
@@ -115,7 +96,7 @@ class _Move:
     @classmethod
     def of(
         cls,
-        beliefs: BeliefFilters,
+        filters: BeliefFilters,
         state: BayesState,
         epoch: Epoch,
         rng: np.random.Generator,
@@ -126,7 +107,7 @@ class _Move:
         ranged = any(isfinite(one.pseudorange_m) for one in epoch.pseudoranges)
         stood_s = epoch.time_s - state.watch.pace.stepped_s
         return cls(
-            beliefs=beliefs,
+            filters=filters,
             state=state,
             epoch=epoch,
             rng=rng,
@@ -135,19 +116,14 @@ class _Move:
             ranged=ranged,
             positioned=epoch.gnss is not None or ranged,
             # Courses along ways count from a heading of 0, those of a compass from its headings.
-            by_course=beliefs.followed_ways(state),
-            belief=state.belief,
-            alternative=state.alternative,
-            twin=state.twin,
-            held=state.held,
-            half_turns=state.half_turns,
-            unaided=state.unaided,
+            by_course=filters.followed_ways(state),
+            beliefs=BeliefSet.of(state),
             leg=state.leg,
             reckoning=state.reckoning,
             path=state.path,
             heading_rad=state.heading_rad,
             # Who stood may have turned there.
-            walking_rad=state.walking_rad if stood_s <= beliefs.holds.longest_pause_s else nan,
+            walking_rad=state.walking_rad if stood_s <= filters.holds.longest_pause_s else nan,
             compass=state.compass,
             unused=[],
         )
@@ -157,47 +133,53 @@ class _Move:
         hold, gone_m = self.state.hold, self.reckoning.travelled_m
         if self.ranged:
             # Pseudoranges are compared with the main belief alone, so there is no doubt of a jump.
-            as_is = (one for one in self.held if one.hold.is_as_measured)
-            self.held = () if hold.is_as_measured else tuple(as_is)
+            as_is = (one for one in self.beliefs.held if one.hold.is_as_measured)
+            self.beliefs = replace(self.beliefs, held=() if hold.is_as_measured else tuple(as_is))
         if self.positioned:
             self.finish_leg()
-        beliefs, null, belief = self.beliefs, self.state.null, self.belief
+        filters, null, rivals = self.filters, self.state.null, self.beliefs
+        belief, held = rivals.main, rivals.held
         if not self.positioned or not isinstance(belief, ParticleBelief):
             return
         # Positions tell whether headings are still read rightly.
-        plain = hold.is_as_measured or any(one.hold.is_as_measured for one in self.held)
+        plain = hold.is_as_measured or any(one.hold.is_as_measured for one in held)
         if not plain and self.state.status is belief.status is Status.TRACKING:
-            white_rad, own = beliefs.model.motion.white_rad, self.own.forking
-            plainly = as_measured(beliefs.holds, belief, null, hold, gone_m, white_rad, own)
-            self.held = (*self.held, plainly)
-        if beliefs.positions_lead(self.state):
+            white_rad, own = filters.model.motion.white_rad, self.own.forking
+            plainly = as_measured(filters.holds, belief, null, hold, gone_m, white_rad, own)
+            self.beliefs = replace(self.beliefs, held=(*held, plainly))
+        if filters.positions_lead(self.state):
             own = self.own.beginning
-            alone = without_positions(beliefs.pulls, belief, null, hold, gone_m, own)
-            self.unaided = (*self.unaided, alone)
+            alone = without_positions(filters.pulls, belief, null, hold, gone_m, own)
+            self.beliefs = replace(self.beliefs, unaided=(*self.beliefs.unaided, alone))
 
     def carry_on(self, rested: Rest) -> None:
         """Spread the belief over where one may have been carried during a rest that has ended."""
-        if self.belief is not None and self.beliefs.may_have_left(self.state):
+        if self.beliefs.main is not None and self.filters.may_have_left(self.state):
             self.finish_leg()
             gone_s = self.epoch.time_s - rested.since_s
-            self.belief = carried_on(self.belief, rested, gone_s, self.own.carrying)
+            gone = carried_on(self.beliefs.main, rested, gone_s, self.own.carrying)
+            self.beliefs = replace(self.beliefs, main=gone)
 
     def by_row(self, row: MotionStep) -> None:
         """Move everything by one row of motion."""
-        if self.by_course and self.belief is not None and isfinite(row.heading_rad):
-            self._count_from(row.heading_rad)
+        if self.by_course and self.beliefs.main is not None and isfinite(row.heading_rad):
+            self.by_course = False
+            self.beliefs = replace(self.beliefs, held=(), unaided=())
+            # What waits is part of the course.
+            self.finish_leg()
+            self.beliefs = self.beliefs.counted_from(row.heading_rad)
         measured, self.heading_rad = headed(row, self.heading_rad)
         if self.compass and measured.turned_sd_rad > 0:
             # A compass tells where the phone points afterwards.
             measured = replace(measured, turned_sd_rad=0.0)
         step = self.state.hold.read(measured)
         why = Reason.NOT_STARTED
-        if self.beliefs.map_may_start:
+        if self.filters.map_may_start:
             known = isfinite(row.heading_rad) == self.compass or not self.path.here.travelled_m
             self.path = (self.path if known else RecentPath()).moved(step)
             why = Reason.USED if isfinite(step.step_m) else Reason.NO_STEP
-        if self.belief is not None:
-            why = self._move_beliefs(self.belief, row, measured, step)
+        if self.beliefs.main is not None:
+            why = self._move_beliefs(self.beliefs.main, row, measured, step)
         elif not isfinite(row.spread_m):
             # An unmeasured way says nothing of the compass.
             self.compass = isfinite(row.heading_rad)
@@ -208,17 +190,6 @@ class _Move:
         if why is not Reason.USED:
             self.unused.append(UnusedReading(self.epoch.time_s, "motion", "", why))
 
-    def _count_from(self, heading_rad: float) -> None:
-        """Count what followed the ways from the first heading of a compass."""
-        self.by_course, self.held, self.unaided = False, (), ()
-        # What waits is part of the course.
-        self.finish_leg()
-        assert self.belief is not None, "there is one to count"
-        self.belief = counted_from(self.belief, heading_rad)
-        if self.alternative is not None:
-            other = counted_from(self.alternative.belief, heading_rad)
-            self.alternative = replace(self.alternative, belief=other)
-
     def _move_beliefs(
         self, belief: MapBelief, row: MotionStep, measured: MotionStep, step: MotionStep
     ) -> Reason:
@@ -226,14 +197,14 @@ class _Move:
         turned = isfinite(row.heading_rad) or isfinite(row.spread_m)
         if self.compass and not turned and self.reckoning.travelled_m == 0:
             # Nothing has moved yet, so headings can still be relative to the first one.
-            self.compass, belief = False, self.beliefs.without_compass(belief, self.rng)
+            self.compass, belief = False, self.filters.without_compass(belief, self.rng)
             # What began beside it has headings of a compass.
-            self.unaided = ()
-            self.belief = belief
-        if self.compass and not self.ranged and jumps(self.walking_rad, row, self.beliefs.holds):
+            self.beliefs = replace(self.beliefs, main=belief, unaided=())
+        if self.compass and not self.ranged and jumps(self.walking_rad, row, self.filters.holds):
             self.finish_leg()
-            assert self.belief is not None, "steps wait for a belief"
-            self.belief = self._at_a_jump(self.belief, row.heading_rad)
+            jump_rad, gone_m = (self.walking_rad, row.heading_rad), self.reckoning.travelled_m
+            known = self.filters, self.state, jump_rad, gone_m, self.own
+            self.beliefs = self.beliefs.at_jump(*known, positioned=self.positioned)
         before, self.reckoning = self.reckoning, self.reckoning.moved(step)
         if self.gathers and isinstance(belief, ParticleBelief) and may_wait(measured):
             self._join(measured, before)
@@ -257,77 +228,25 @@ class _Move:
             self._take(leg.step)
 
     def _take(self, measured: MotionStep) -> Reason:
-        """Move all beliefs by a step, each as it reads it."""
-        belief, step = self.belief, self.state.hold.read(measured)
-        assert belief is not None, "steps wait for a belief"
-        predict = self.beliefs.moving_filter(self.state, compass=self.compass).predict
-        if self.held:
-            own = self.own.moving
-            self.held = tuple(moved_as_read(one, predict, measured, own) for one in self.held)
-        if self.unaided:
-            own = self.own.unaided
-            beside = (moved_as_read(one, predict, measured, own) for one in self.unaided)
-            self.unaided = tuple(beside)
-        belief, why = predict(belief, assumed(step, belief), self.rng)
-        motion = self.beliefs.model.motion
-        self.belief = remounted(belief, motion, abs(step.step_m), self.rng)
-        if self.alternative is not None:
-            other = self.alternative.belief
-            as_read = self.alternative.hold.read(measured)
-            other, _ = predict(other, assumed(as_read, other), self.rng)
-            self.alternative = replace(self.alternative, belief=other)
-        if self.twin is not None:
-            other = self.twin.belief
-            other, _ = predict(other, assumed(mirrored_step(step), other), self.rng)
-            self.twin = replace(self.twin, belief=other)
+        known = self.filters, self.state, measured, self.own, self.rng
+        self.beliefs, why = self.beliefs.by_step(*known, compass=self.compass)
         return why
-
-    def _at_a_jump(self, belief: MapBelief, heading_rad: float) -> MapBelief:
-        """Begin beliefs in which the phone was turned where a heading jumps; return the main one.
-
-        A search takes them into itself.
-        """
-        if belief.status is Status.SEARCHING:
-            if self.positioned:
-                return belief
-            changed_rad = self.state.hold.sign * (heading_rad - self.walking_rad)
-            usual, turns, back = self.beliefs.holds, self.half_turns, None
-            if usual.is_around(changed_rad):
-                self.half_turns = turns.in_search()
-                if turns.searched and self.beliefs.model.motion.tells_turned:
-                    back = turns.back_probability(usual)
-            rules, own = turns.rules(usual), self.own.forking
-            return turned_at_jump(belief, rules, changed_rad, own, back_probability=back)
-        tracked = self.state.status is Status.TRACKING and belief.status is Status.TRACKING
-        if tracked and isinstance(belief, ParticleBelief):
-            beliefs, null, hold = self.beliefs, self.state.null, self.state.hold
-            rules, white_rad, own = beliefs.holds, beliefs.model.motion.white_rad, self.own.forking
-            turns = self.half_turns.found(belief)
-            # What is still open tells something, too.
-            around = turns.with_jumps(self.held, belief).rules(rules).around_probability
-            gone_m, jump_rad = self.reckoning.travelled_m, (self.walking_rad, heading_rad)
-            by = rules, belief, null, hold, jump_rad, gone_m, white_rad, own
-            more = forked(*by, around_probability=around)
-            beside = (*self.held, *more)
-            self.held = still_open(rules, beside, belief, gone_m)
-            self.half_turns = turns.after(beside, self.held, belief)
-        return belief
 
     def after(self, watch: SensorWatch) -> BayesState:
         """Return the state after the motion, with that of the sensors."""
         return replace(
             self.state,
-            belief=self.belief,
+            belief=self.beliefs.main,
             reckoning=self.reckoning,
             heading_rad=self.heading_rad,
             compass=self.compass,
-            alternative=self.alternative,
+            alternative=self.beliefs.alternative,
             path=self.path,
             watch=watch,
-            twin=self.twin,
+            twin=self.beliefs.twin,
             walking_rad=self.walking_rad,
-            held=self.held,
-            half_turns=self.half_turns,
-            unaided=self.unaided,
+            held=self.beliefs.held,
+            half_turns=self.beliefs.half_turns,
+            unaided=self.beliefs.unaided,
             leg=self.leg,
         )

@@ -12,7 +12,8 @@ from mapfilter.tracks.readers.plain.identities import cell_identities, roles
 from mapfilter.tracks.readers.plain.mapped import Mapped
 from mapfilter.tracks.readers.recorded.identities import add_radio, without_zeros
 from mapfilter.tracks.readers.recorded.reading import Reading
-from mapfilter.tracks.readers.texts.columns import MISSING, only
+from mapfilter.tracks.readers.texts.kept_rows import only
+from mapfilter.tracks.readers.texts.numbers import MISSING
 
 _IMPLIED = {**OF_CARRIERS, **dict.fromkeys(("eci", *FIELDS["enodeb"]), "LTE"), "nci": "NR"}
 """Technologies of columns: the carrier, or the identity, has a name of its own in each."""

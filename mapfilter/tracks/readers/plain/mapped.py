@@ -17,7 +17,9 @@ from mapfilter.tracks.readers.plain.fields import FIELDS, check_fields
 from mapfilter.tracks.readers.plain.headers import stated_fields
 from mapfilter.tracks.readers.recorded.identities import available, parse_identities
 from mapfilter.tracks.readers.recorded.reading import Reading
-from mapfilter.tracks.readers.texts.columns import MISSING, Columns, only
+from mapfilter.tracks.readers.texts.columns import Columns
+from mapfilter.tracks.readers.texts.kept_rows import only
+from mapfilter.tracks.readers.texts.numbers import MISSING
 
 _AZIMUTHS = ("azimuth", "compass", "compass_azimuth")
 _DIRECTIONS = (

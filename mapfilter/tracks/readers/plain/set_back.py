@@ -12,7 +12,7 @@ from mapfilter.tracks.readers.clocks.set_back import set_back_by
 from mapfilter.tracks.readers.plain.fix_states import fix_column
 from mapfilter.tracks.readers.plain.mapped import Mapped
 from mapfilter.tracks.readers.recorded.reading import Reading
-from mapfilter.tracks.readers.texts.columns import MISSING
+from mapfilter.tracks.readers.texts.numbers import MISSING
 
 _FLAGS, _MOSTLY = {"0", "1"}, 0.5
 

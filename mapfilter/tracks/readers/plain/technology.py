@@ -7,7 +7,7 @@ from dataclasses import replace
 from mapfilter.radio.identities import technology
 from mapfilter.tracks.readers.plain.mapped import Mapped
 from mapfilter.tracks.readers.recorded.reading import Reading
-from mapfilter.tracks.readers.texts.columns import MISSING
+from mapfilter.tracks.readers.texts.numbers import MISSING
 
 _MAYBE = (
     *("networktype", "network_technology", "access_technology", "radio_type", "radiotype"),

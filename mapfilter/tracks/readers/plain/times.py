@@ -39,7 +39,8 @@ from mapfilter.tracks.readers.plain.weeks import (
 )
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.recorded.recording import Clock
-from mapfilter.tracks.readers.texts.columns import MISSING, Columns
+from mapfilter.tracks.readers.texts.columns import Columns
+from mapfilter.tracks.readers.texts.numbers import MISSING
 
 _TIMES = "seconds, Unix time, or ISO 8601 such as 2026-05-01T10:00:00+02:00"
 _EPOCH_DAYS = 25_569.0

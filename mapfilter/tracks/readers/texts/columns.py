@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -14,7 +13,6 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from mapfilter._types import Bools, Floats, Ints
-from mapfilter._words import number_of
 from mapfilter.tracks.readers.clocks.local_parts import note_changes
 from mapfilter.tracks.readers.clocks.local_times import is_beside_change
 from mapfilter.tracks.readers.clocks.plain_times import plain_times
@@ -26,13 +24,7 @@ from mapfilter.tracks.readers.clocks.times import (
 )
 from mapfilter.tracks.readers.clocks.written_dates import are_compact, order_of, with_year_first
 from mapfilter.tracks.readers.recorded.reading import Reading
-
-_NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
-_DIGIT = r"\d"
-_WHOLE = r"^(?:[-+]?(\d{1,18}|[0-8]\d{18})|0[xX][0-9a-fA-F]{1,15})$"
-_SHORTENED = re.compile(r"\d{1,9}(?:[.,]\d{1,17})?[eE]\+?\d{1,3}")
-MISSING = ("", "-", "nan", "NaN", "NA", "N/A", "null", "NULL", "None", "none", "#N/A")
-"""Texts of missing values."""
+from mapfilter.tracks.readers.texts.numbers import DIGIT, read_numbers, read_whole_numbers
 
 
 @dataclass(eq=False)
@@ -213,7 +205,7 @@ class Columns:
         column = self._raw(*names)
         if column is None:
             return np.zeros(len(self), dtype=bool)
-        return np.asarray(pc.match_substring_regex(column, _DIGIT).to_numpy(), dtype=bool)
+        return np.asarray(pc.match_substring_regex(column, DIGIT).to_numpy(), dtype=bool)
 
     def first_text(self, name: str) -> str:
         """Return the first text of a column that has a digit; "" where there is none."""
@@ -221,7 +213,7 @@ class Columns:
         if column is None:
             return ""
         # A receiver without a fix may leave a column blank for long.
-        at = pc.index(pc.match_substring_regex(column, _DIGIT), value=True).as_py()
+        at = pc.index(pc.match_substring_regex(column, DIGIT), value=True).as_py()
         return "" if at < 0 else str(column[at].as_py()).strip()
 
     def joined(self, before: str, name: str) -> Columns:
@@ -252,7 +244,7 @@ class Columns:
             return np.full(len(self), np.nan)
         if self.decimal_comma:
             column = pc.replace_substring(column, ",", ".")
-        numbers = self._cast(column, pa.float64(), _NUMBER, names)
+        numbers = read_numbers(column, self.find(*names) or "", self.line, self.reading)
         return np.asarray(numbers.to_numpy(), dtype=np.float64)
 
     def whole(self, *names: str) -> tuple[Ints, Bools]:
@@ -263,66 +255,6 @@ class Columns:
         column = self._raw(*names)
         if column is None:
             return np.zeros(len(self), dtype=np.int64), np.zeros(len(self), dtype=bool)
-        column = pc.replace_substring_regex(pc.utf8_trim_whitespace(column), r"\.0*$", "")
-        numbers = self._cast(column, pa.int64(), _WHOLE, names)
+        numbers = read_whole_numbers(column, self.find(*names) or "", self.line, self.reading)
         there = np.asarray(pc.is_valid(numbers).to_numpy(), dtype=bool)
         return np.asarray(pc.fill_null(numbers, 0).to_numpy(), dtype=np.int64), there
-
-    def _cast(
-        self, column: pa.ChunkedArray, kind: pa.DataType, pattern: str, names: Sequence[str]
-    ) -> pa.ChunkedArray:
-        name, part = self.find(*names) or "", int(self.line[0]) if len(self) else 0
-        try:
-            numbers = pc.cast(column, kind)
-        except pa.ArrowInvalid:
-            pass
-        else:
-            given = pc.is_valid(numbers)
-            if pa.types.is_floating(kind):
-                given = pc.and_not(given, pc.is_nan(numbers))
-            self.reading.tallies.add_texts(name, part, pc.sum(given).as_py() or 0)
-            return numbers
-        column = pc.utf8_trim_whitespace(column)
-        missing = pc.is_in(column, pa.array(MISSING))
-        good = pc.match_substring_regex(column, pattern)
-        wrong = pc.and_not(pc.invert(good), missing)
-        bad = pc.sum(wrong).as_py()
-        # A word such as "unknown" stands for a missing value.
-        odd = pc.and_(wrong, pc.match_substring_regex(column, _DIGIT))
-        count = pc.sum(odd).as_py() or 0
-        examples = pc.unique(pc.filter(column, odd))[:2].to_pylist()
-        self.reading.tallies.add_texts(name, part, pc.sum(good).as_py() + count, count, examples)
-        if bad:
-            at = pc.index(wrong, value=True).as_py()
-            first = f"first {column[at].as_py()[:40]!r} in line {self.line[at]}"
-            if pa.types.is_integer(kind) and _SHORTENED.fullmatch(column[at].as_py()):
-                first += "; shortened by a spreadsheet: show all digits there, and export again"
-            self.reading.count(
-                lambda n: (
-                    f"{name}: {number_of(n, 'value is no number', 'values are no numbers')}, "
-                    f"taken as missing ({first})"
-                ),
-                bad,
-                key=f"{name}, {kind}",
-                source=part,
-                ignored=True,
-            )
-        column = pc.replace_substring_regex(column, r"^\+", "")
-        return pc.cast(pc.if_else(good, column, None), kind)
-
-
-def only(columns: Mapping[str, Any], lines: Ints, rows: Bools) -> tuple[dict[str, Any], Ints]:
-    """Return some rows of arrays, and their lines; the arrays themselves where all are kept."""
-    if rows.all():
-        return dict(columns), lines
-    kept = {name: v[rows] if np.ndim(v) else v for name, v in columns.items()}
-    return kept, lines[rows]
-
-
-def changed_rows(columns: Mapping[str, Floats], names: Sequence[str]) -> Bools:
-    """Return which rows differ from the row before in one of some columns; the first one does."""
-    changed = np.ones(len(columns[names[0]]), dtype=bool)
-    if len(changed):
-        steps = np.stack([np.diff(np.nan_to_num(columns[name])) for name in names])
-        changed[1:] = (steps != 0).any(axis=0)
-    return changed

@@ -1,0 +1,1 @@
+"""Zhang, Knedlik & Loffeld (2006): bounds for timing advance and levels in GSM, and filters."""
