@@ -97,9 +97,9 @@ def test_what_lasts_of_a_fix_is_in_the_place_and_what_is_white_in_the_update():
 @pytest.mark.parametrize(
     ("before_m", "fixed_s", "lasting_m"),
     [
-        # From 4 to 16 m² over half a minute, by the time since the last fix.
-        (2.0, 0.0, sqrt(4 + (1 - exp(-1.0)) * 12)),
-        (2.0, nan, 4.0),
+        # From 9 to 16 m² over half a minute, by the time since the last fix.
+        (3.0, 0.0, sqrt(9 + (1 - exp(-1.0)) * 7)),
+        (3.0, nan, 4.0),
         (4.0, 0.0, 4.0),
         (5.0, 0.0, 4.0),
     ],
