@@ -108,6 +108,8 @@ def test_the_latest_way_is_told():
         # The middles of both halves are 30 m apart, and 29.
         ([0.0, 49.0, 60.0, 49.0, 50.0, 100.0], True),
         ([0.0, 49.0, 61.0, 49.0, 50.0, 100.0], False),
+        # Of seven the fourth is of neither half: these are 65 / 3 m apart.
+        ([0.0, 50.0, 95.0, 100.0, 60.0, 50.0, 100.0], False),
     ],
 )
 def test_a_way_is_no_jump_and_no_wandering(along_m, goes_on):
@@ -148,3 +150,15 @@ def test_who_was_farther_away_does_not_stand():
     assert near.standing == near
     assert places([0.0]).standing is None
     assert Places().standing is None
+
+
+def test_limits_count_as_reached():
+    """6 and 8 m: 40 m are four of their deviations, and 40 s stand."""
+    one, other = Place(0.0, 0.0, 0.0, 0.0, 6.0), Place(40.0, 0.0, 39.0, 0.0, 8.0)
+    assert Places((one, other)).standing == Places((one, other))
+    assert Places((one, other._replace(east_m=40.0))).standing is None
+    assert Places((one,)).are_left_by(GnssFix(40.0, 0.0, 64.0, 64.0))
+    # The middles of the halves are 30 of 100 m apart.
+    along_m = [0.0, 40.0, 40.0, 40.0, 40.0, 50.0, 50.0, 100.0]
+    rows = tuple(Place(2.0 * k, 0.0, east_m, 0.0, 5.0) for k, east_m in enumerate(along_m))
+    assert Places(rows).carried == (0.0, 100 / 14)
