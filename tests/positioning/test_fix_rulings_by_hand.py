@@ -190,3 +190,20 @@ def test_how_imprecise_fixes_are_is_followed(excess, off_m, rests, expected):
 @pytest.mark.parametrize(("excess", "times"), [(1.49, 1.0), (1.5, 1.5), (7.0, 7.0)])
 def test_variances_are_raised_from_one_and_a_half_times_on(excess, times):
     assert FixRecord(excess=excess).understated == times
+
+
+def test_fixes_have_agreed_since_the_first_of_them():
+    record = FixRecord()
+    for time_s in (5.0, 6.0, 9.0):
+        record, _ = at_fix(record, time_s, [1.0, 0.0])
+        assert record.agreed_from_s == 5.0
+    assert record.agreed == 3
+
+
+@pytest.mark.parametrize(("lasted_s", "is_over"), [(15.0, True), (15.1, False)])
+def test_a_burst_lasts_a_quarter_of_a_minute_at_most(lasted_s, is_over):
+    record, _ = after([0.0, 14.0, lasted_s], [[60.0, 0.0]] * 3)
+    assert record.is_lost
+    assert not record.at_time(lasted_s + 60.0).is_over
+    assert record.at_time(lasted_s + 60.1).is_over is is_over
+    assert record.at_time(lasted_s + 60.1).is_lost is not is_over
