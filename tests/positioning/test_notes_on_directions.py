@@ -61,7 +61,7 @@ def test_walkers_without_positions_have_none_that_are_left_out():
 def test_ranges_are_positions_too():
     ranges = pd.DataFrame({
         "time_s": [0.0], "satellite": ["G01"], "pseudorange_m": [2.1e7],
-        "satellite_x_m": [1.5e7], "satellite_y_m": [1e7], "satellite_z_m": [2e7],
+        "x_m": [1.5e7], "y_m": [1e7], "z_m": [2e7],
     })  # fmt: skip
     log = make_log(CRS, motion=moved(), pseudoranges=ranges)
     assert undirected_notes(log, BayesFilter()) == (THINNED,)
