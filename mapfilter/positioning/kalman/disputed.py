@@ -127,9 +127,9 @@ class ComparedFix(NamedTuple):
     off_m: Floats
     predicted_m2: Floats
     stated_m2: Floats
-    rests: bool = False
-    is_doubted: bool = False
-    gone_m: float = 0.0
+    rests: bool
+    is_doubted: bool
+    gone_m: float
 
 
 class _Row(NamedTuple):
