@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import mapfilter as mf
+from mapfilter.clocks.times import parse_times
 from mapfilter.survey.antennas_log import _iso
 from mapfilter.survey.measurement_rows import unix_seconds
-from mapfilter.tracks.readers.clocks.times import parse_times
 
 NEW_YEAR_S = 1_483_228_800.0
 ISO = [

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from mapfilter.clocks.local_times import parse_zone
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail, listed
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions
-from mapfilter.tracks.readers.clocks.local_times import parse_zone
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import format_of, read_recording
 from mapfilter.tracks.readers.recorded.recording import Recording

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from mapfilter._types import Floats
+from mapfilter.clocks.times import unix_seconds
 from mapfilter.errors import InputError, MapfilterError, fail
-from mapfilter.tracks.readers.clocks.times import unix_seconds
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.plain.fields import usual_fields
 from mapfilter.tracks.readers.plain.headers import stated_fields

@@ -11,10 +11,10 @@ import numpy as np
 
 from mapfilter._constants import GPS_EPOCH_S
 from mapfilter._types import Floats
+from mapfilter.clocks.times import utc_from_gps_s, utc_from_week_s
 from mapfilter.errors import InputError, fail
 from mapfilter.gnss.almanacs import WEEK_S
 from mapfilter.tracks.joining.position_units import RADIUS_68
-from mapfilter.tracks.readers.clocks.times import utc_from_gps_s, utc_from_week_s
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.recorded.recording import Clock

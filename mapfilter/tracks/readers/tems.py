@@ -31,7 +31,7 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Bools, Floats
-from mapfilter.tracks.readers.clocks.times import without_midnights
+from mapfilter.clocks.times import without_midnights
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.plain_csv import has_content
 from mapfilter.tracks.readers.recorded.identities import add_radio, available

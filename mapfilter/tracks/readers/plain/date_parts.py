@@ -9,7 +9,7 @@ import numpy as np
 
 from mapfilter._constants import DAY_S
 from mapfilter._types import Floats
-from mapfilter.tracks.readers.clocks.times import parse_times
+from mapfilter.clocks.times import parse_times
 from mapfilter.tracks.readers.plain.fields import FIELDS
 from mapfilter.tracks.readers.plain.headers import columns_of
 from mapfilter.tracks.readers.texts.columns import Columns

@@ -12,10 +12,8 @@ import pyarrow as pa
 from mapfilter._constants import DAY_S
 from mapfilter._types import Floats
 from mapfilter._words import number_of
-from mapfilter.errors import InputError, fail
-from mapfilter.tracks.readers.clocks.local_parts import note_changes
-from mapfilter.tracks.readers.clocks.local_times import utc_from_local_s
-from mapfilter.tracks.readers.clocks.times import (
+from mapfilter.clocks.local_times import utc_from_local_s
+from mapfilter.clocks.times import (
     LEAST_UNIX_S,
     are_days,
     in_days,
@@ -25,7 +23,9 @@ from mapfilter.tracks.readers.clocks.times import (
     utc_from_week_s,
     without_midnights,
 )
-from mapfilter.tracks.readers.clocks.written_dates import are_compact, order_of, with_year_first
+from mapfilter.clocks.written_dates import are_compact, order_of, with_year_first
+from mapfilter.errors import InputError, fail
+from mapfilter.tracks.readers.clocks.local_parts import note_changes
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.plain.dates import OF_DAY, seconds_in_digits
 from mapfilter.tracks.readers.plain.headers import columns_of

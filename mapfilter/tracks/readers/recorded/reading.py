@@ -42,7 +42,7 @@ class Reading(Remarks):
     ``last_s`` is the last time of the file's rows, used or not, and ``passed_s`` that of the parts
     read so far, of formats without ``last_s``; ``columns`` are the names in the file of columns
     without a usual name, by field. ``doubled`` is by how much all times so far may be later, as of
-    :func:`mapfilter.tracks.readers.clocks.local_times.doubled_s`, and the note on it; ``by_zone``
+    :func:`mapfilter.clocks.local_times.doubled_s`, and the note on it; ``by_zone``
     whether any of them is UTC by the zone that was given; ``date_order`` whether dates with the
     year at the end begin with "day" or "month", as one of them shows, or the order of dates of
     digits; ``value_units`` the units behind the values of columns. ``kept`` are rows that

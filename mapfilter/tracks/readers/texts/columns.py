@@ -15,16 +15,16 @@ import pyarrow.compute as pc
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
-from mapfilter.tracks.readers.clocks.local_parts import note_changes
-from mapfilter.tracks.readers.clocks.local_times import is_beside_change
-from mapfilter.tracks.readers.clocks.plain_times import plain_times
-from mapfilter.tracks.readers.clocks.times import (
+from mapfilter.clocks.local_times import is_beside_change
+from mapfilter.clocks.plain_times import plain_times
+from mapfilter.clocks.times import (
     LEAST_UNIX_S,
     parse_times,
     seconds_of_day,
     unix_seconds,
 )
-from mapfilter.tracks.readers.clocks.written_dates import are_compact, order_of, with_year_first
+from mapfilter.clocks.written_dates import are_compact, order_of, with_year_first
+from mapfilter.tracks.readers.clocks.local_parts import note_changes
 from mapfilter.tracks.readers.recorded.reading import Reading
 
 _NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"

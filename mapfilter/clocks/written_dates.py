@@ -7,7 +7,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from mapfilter._types import Floats
-from mapfilter.tracks.readers.clocks.times import LEAST_UNIX_S
+from mapfilter.clocks.times import LEAST_UNIX_S
 
 _COMPACT = r"^((?:19|20)\d\d)(\d\d)(\d\d)(\d\d)(\d\d)(\d\d)"
 """A date and a time in one number, such as 20260501101530, with milliseconds or without."""
