@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +36,12 @@ from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.recorded.recording import Recording
 from mapfilter.tracks.readers.texts import long_tables
-from mapfilter.tracks.readers.texts.separated_values import header_names, likely_separator
+from mapfilter.tracks.readers.texts.columns import Columns
+from mapfilter.tracks.readers.texts.separated_values import (
+    header_columns,
+    header_names,
+    likely_separator,
+)
 from mapfilter.tracks.readers.texts.text import Text, parts_of, read_text
 from mapfilter.tracks.readers.texts.title_lines import below_title
 from mapfilter.tracks.readers.unknown_formats import JSON, NOT_READ, unknown_format
@@ -145,8 +153,10 @@ def read_recording(
     try:
         # Numbers of any size occur in damaged files; what comes of them is checked in the end.
         with np.errstate(all="ignore"):
-            for part in parts_of(text) if known.by_rows else (text,):
+            for at, part in enumerate(parts_of(text) if known.by_rows else (text,)):
+                reading.later = partial(_columns_after, text, at) if known.by_rows else tuple
                 known.read(part, reading, options)
+        reading.later = tuple
         # A large text and the tables need not be in memory at the same time.
         del text
         return reading.done(known.name)
@@ -158,6 +168,12 @@ def read_recording(
             for fault in error.faults
         )
         raise InputError(named) from error
+
+
+def _columns_after(text: Text, at: int) -> Iterator[Columns]:
+    """Yield the columns of the parts of a text after one of them."""
+    for part in islice(parts_of(text), at + 1, None):
+        yield header_columns(part.data, Reading(text.path), part.line)
 
 
 def _below_title(text: Text, options: ReadOptions | None) -> Text | None:

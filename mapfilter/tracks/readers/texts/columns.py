@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import nan
@@ -16,14 +16,8 @@ import pyarrow.compute as pc
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter._words import number_of
 from mapfilter.clocks.local_times import is_beside_change
-from mapfilter.clocks.plain_times import plain_times
-from mapfilter.clocks.times import (
-    LEAST_UNIX_S,
-    parse_times,
-    seconds_of_day,
-    unix_seconds,
-)
-from mapfilter.clocks.written_dates import are_compact, order_of, with_year_first
+from mapfilter.clocks.times import parse_times, seconds_of_day
+from mapfilter.clocks.written_times import written_times
 from mapfilter.tracks.readers.clocks.local_parts import note_changes
 from mapfilter.tracks.readers.recorded.reading import Reading
 
@@ -122,35 +116,25 @@ class Columns:
     def _times(
         self, names: Sequence[str], zone: str, layout: str, after_s: float
     ) -> tuple[Floats, bool]:
-        rows = self
+        rows, reading = self, self.reading
         if self.decimal_comma and layout == "ISO8601":
             rows = self.rewritten(r"^(\s*\d+),(\d+\s*)$", r"\1.\2", *names)
         column = rows._raw(*names)
         if column is None:
             return parse_times(rows.texts(*names), zone, layout, after_s)
-        if layout == "ISO8601":
-            try:
-                number = np.asarray(pc.cast(column, pa.float64()).to_numpy(), dtype=np.float64)
-            except pa.ArrowInvalid:
-                pass
-            else:
-                if not are_compact(number):
-                    unix = np.where(np.abs(number) > LEAST_UNIX_S, number, np.nan)
-                    return unix_seconds(unix), True
-        if (found := plain_times(column, zone, layout, after_s)) is not None:
-            return found
-        if layout == "ISO8601":
-            rows = rows._with_year_first(column, names)
-        return parse_times(rows.texts(*names), zone, layout, after_s)
+        later = partial(self._later, self.find(*names) or "")
+        found = written_times(column, zone, layout, after_s, reading.date_order, later)
+        reading.date_order = found.order or reading.date_order
+        for note in found.notes:
+            reading.note(note)
+        return found.time_s, found.zoned
 
-    def _with_year_first(self, column: pa.ChunkedArray, names: Sequence[str]) -> Columns:
-        """Return columns with a column of times in the order of ISO 8601; note another one."""
-        reading, name = self.reading, self.find(*names) or ""
-        if reading.date_order not in ("day", "month") and (order := order_of(column)):
-            reading.date_order = order
-            reading.note(f"time: the {order} first in dates with slashes or hyphens")
-        ordered = with_year_first(column, reading.date_order)
-        return replace(self, _columns={**self._columns, self.names.index(name): ordered})
+    def _later(self, name: str) -> Iterator[pa.ChunkedArray]:
+        """Yield a column of times, or of their dates, of later parts of the file."""
+        for rows in self.reading.later():
+            column = rows._raw(*filter(None, (self.reading.date_column, name)))
+            if column is not None:
+                yield column
 
     def times_of_part(
         self, *names: str, zone: str = "", layout: str = "ISO8601"
