@@ -131,6 +131,10 @@ def _file_info(path: Path) -> dict[str, Any]:
     if format_of(path) is not None:
         return _recording_info(path)
     if is_zip(path):
+        from mapfilter.tracks.zipped_logs import UNPACK, is_zipped_log
+
+        if is_zipped_log(path):
+            raise fail(InputError, str(path), _EXPECTED, "a ZIP", UNPACK)
         formats = [known.name for one in files_in_zip(path) if (known := format_of(one))]
         if found := _recordings_info(formats, _USE_OF_RECORDINGS):
             return found

@@ -32,6 +32,7 @@ from mapfilter.tracks.readers import (
     tems,
     wigle,
 )
+from mapfilter.tracks.readers.contained.opening import OF_TABLES, read_any
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.recorded.recording import Recording
@@ -42,7 +43,7 @@ from mapfilter.tracks.readers.texts.separated_values import (
     header_names,
     likely_separator,
 )
-from mapfilter.tracks.readers.texts.text import Text, parts_of, read_text
+from mapfilter.tracks.readers.texts.text import Text, parts_of
 from mapfilter.tracks.readers.texts.title_lines import below_title
 from mapfilter.tracks.readers.unknown_formats import JSON, NOT_READ, unknown_format
 
@@ -96,10 +97,14 @@ def find_format(text: Text) -> Format | None:
     return next((known for known in FORMATS if known.matches(text)), None)
 
 
+def _is_known(text: Text) -> bool:
+    return find_format(text) is not None
+
+
 def format_of(path: str | Path) -> Format | None:
     """Return the format that a file looks like by its beginning; None for another file."""
     try:
-        text = read_text(Path(path), _PEEKED_BYTES)
+        text = read_any(Path(path), _is_known, _PEEKED_BYTES)
     except InputError:
         return None
     found = find_format(text)
@@ -130,10 +135,14 @@ def read_recording(
     if path.is_dir():
         raise fail(InputError, str(path), "a file", "a folder", "name the files in it")
     try:
-        text = read_text(path)
+        text = read_any(path, _is_known, own=options.columns.values() if options else ())
     except InputError as error:
-        hint = NOT_READ.get(path.suffix.lower(), "")
-        raise InputError(tuple(replace(f, hint=hint or f.hint) for f in error.faults)) from error
+        suffix = path.suffix.lower()
+        hint = NOT_READ.get(suffix, "")
+        of_table = [f.hint if suffix in OF_TABLES else "" for f in error.faults]
+        hints = [own or hint or f.hint for own, f in zip(of_table, error.faults, strict=True)]
+        faults = zip(error.faults, hints, strict=True)
+        raise InputError(tuple(replace(f, hint=told) for f, told in faults)) from error
     found = find_format(text)
     known = format_named(name) if name else found
     own = options is not None and bool(options.columns)

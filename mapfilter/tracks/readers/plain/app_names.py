@@ -122,6 +122,53 @@ _PROGRAMS = (
         {"elevation": "altitude [m]", "speed": "speed [m/s]"},
     ),
     _Program(
+        "columns as of gpsd (m, m/s)",
+        frozenset(("class", "device", "mode", "time", "lat", "lon")),
+        {
+            **dict.fromkeys(("altmsl", "alt"), "altitude [m]"),
+            "eph": "accuracy [m]",
+            "speed": "speed [m/s]",
+            "track": "course [deg]",
+            "mode": "fix_type",
+        },
+    ),
+    _Program(
+        "columns as of OwnTracks (m, km/h)",
+        frozenset(("_type", "tst", "lat", "lon")),
+        {
+            "tst": "timestamp",
+            "acc": "accuracy [m]",
+            "alt": "altitude [m]",
+            "vel": "speed [km/h]",
+            "cog": "course [deg]",
+        },
+    ),
+    _Program(
+        "columns as of Google's location history (degrees times 1e7)",
+        frozenset(("latitudee7", "longitudee7")),
+        {
+            "timestampms": "timestamp",
+            "latitudee7": "lat [dege7]",
+            "longitudee7": "lon [dege7]",
+            "accuracy": "accuracy [m]",
+            "heading": "course [deg]",
+            "velocity": "speed [m/s]",
+        },
+    ),
+    _Program(
+        "columns as of Mozilla's location service (geosubmit)",
+        frozenset(("mobilecountrycode", "mobilenetworkcode", "cellid")),
+        {
+            "mobilecountrycode": "mcc",
+            "mobilenetworkcode": "mnc",
+            "locationareacode": "lac",
+            "primaryscramblingcode": "psc",
+            "radiotype": "radio",
+            "signalstrength": "level [dbm]",
+            "timingadvance": "ta",
+        },
+    ),
+    _Program(
         "columns as of records of FIT (semicircles, seconds since 1989-12-31)",
         frozenset((_FIT_TIME, "record.position_lat[semicircles]")),
         {
