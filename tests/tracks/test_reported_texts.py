@@ -131,7 +131,7 @@ def test_replies_of_a_modem(tmp_path):
     )
     assert radio["role"].tolist() == ["serving", "neighbour", "serving", "serving"]
     named = ["244-91-3021-12345678", None, "310-260-9-5000000001", "244-91-3021-12345678"]
-    assert radio["cell"].where(radio["cell"].notna(), None).tolist() == named
+    assert radio["cell"].astype(object).fillna("").tolist() == [name or "" for name in named]
     assert radio["level_dbm"].tolist() == [-80, -95, -95, -81]
     assert radio["technology"].tolist() == ["LTE", "LTE", "NR", "LTE"]
     assert radio["bsic"].tolist() == [100, 7, 15, 100]
