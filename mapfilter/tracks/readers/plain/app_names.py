@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mapfilter.errors import listed
 from mapfilter.tracks.readers.plain.date_parts import of_parts, parts_of_dates
+from mapfilter.tracks.readers.plain.served_names import with_served_names
 from mapfilter.tracks.readers.texts.columns import Columns
 
 _FIT_EPOCH_S = 631_065_600
@@ -206,7 +208,7 @@ def full_names(names: Sequence[str], own: Collection[str] = ()) -> tuple[str, ..
             else name
             for name in names
         )
-    return of_parts(found, own)
+    return of_parts(with_served_names(found, own), own)
 
 
 def with_full_names(rows: Columns, own: Collection[str]) -> Columns:
@@ -218,6 +220,10 @@ def with_full_names(rows: Columns, own: Collection[str]) -> Columns:
     names = full_names(rows.names, own)
     if names == rows.names:
         return rows
+    served = with_served_names(rows.names, own)
+    renamed = [old for old, new in zip(rows.names, served, strict=True) if old != new]
+    if renamed:
+        rows.reading.note(f"taken for those of the serving cell: {listed(renamed)}")
     if known is not None:
         rows.reading.note(known.note)
         if _FIT_TIME in known.marks and _FIT_TIME not in own:

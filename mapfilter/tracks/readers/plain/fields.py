@@ -76,7 +76,7 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
     "enodeb": ("enodeb", "enodeb_id", "enodebid", "enb", "enb_id", "enbid"),
     "sector": ("sector", "sector_id", "sectorid", "cell_number", "local_cell_id", "lcid"),
     "arfcn": ("arfcn", "uarfcn", "earfcn", "nrarfcn", "nr_arfcn", "narfcn"),
-    "bsic": ("bsic", "psc", "pci", "psc_or_pci", "pci_psc"),
+    "bsic": ("bsic", "psc", "pci", "psc_or_pci", "pci_psc", "psc/pci", "pci/psc"),
     "level_dbm": (
         *("level_dbm", "dbm", "rsrp", "rscp", "rssi", "signal_dbm", "ss_rsrp", "ssrsrp"),
     ),

@@ -7,7 +7,8 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import TypeAlias
 
 from mapfilter._header_units import UNITS, parted_unit, quantity_of
-from mapfilter.tracks.readers.plain.fields import FIELDS, is_of_axis, meant
+from mapfilter.tracks.readers.plain.fields import FIELDS, is_of_axis, meant, usual_fields
+from mapfilter.tracks.readers.plain.served_names import served_name
 
 QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "time": (
@@ -224,8 +225,15 @@ def likely_fields(column: str, taken: Collection[str]) -> list[str]:
         held.add("cell")
     if stated := [field for field in fields_meant(column) if field not in held]:
         return stated
+    # Of several carriers a user knows which is meant.
+    if served := [*usual_fields([_of_level(served_name(column))])]:
+        return [field for field in served if field not in held]
     near = "" if "[" in column or "(" in column else meant(column, held)
     return [near] if near else []
+
+
+def _of_level(name: str) -> str:
+    return "level_dbm" if name == "level [dbm]" else name
 
 
 def _fits(field: str, unit: str) -> bool:
