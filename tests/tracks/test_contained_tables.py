@@ -248,3 +248,24 @@ def test_other_json_is_no_recording(tmp_path):
         assert format_of(path) is None
         with pytest.raises(InputError, match="JSON without records of places or cells"):
             read_recording(path)
+
+
+TCX = (
+    '<?xml version="1.0"?><TrainingCenterDatabase><Activities><Activity><Lap><Track>{}</Track>'
+    "</Lap></Activity></Activities></TrainingCenterDatabase>"
+)
+
+
+def test_points_of_tcx(tmp_path):
+    """They were refused."""
+    points = "".join(
+        f"<Trackpoint><Time>{ISO[at]}</Time><Position><LatitudeDegrees>{LAT_DEG[at]}"
+        "</LatitudeDegrees><LongitudeDegrees>24.94</LongitudeDegrees></Position><Extensions><ns3:TPX>"
+        "<ns3:Speed>8.0</ns3:Speed></ns3:TPX></Extensions></Trackpoint>"
+        for at in ROWS
+    )
+    indoors = f"<Trackpoint><Time>{ISO[0]}</Time></Trackpoint>"
+    positions = assert_placed(read(tmp_path, "run.tcx", TCX.format(points + indoors)))
+    assert positions["speed_mps"].tolist() == [8.0] * 5
+    with pytest.raises(InputError, match="recorded indoors"):
+        read(tmp_path, "run.tcx", TCX.format(indoors))

@@ -72,3 +72,15 @@ def test_columns_that_a_user_names_or_that_are_there_stay():
     names = ["time", "lte rsrp", "lte pci"]
     assert with_served_names(names, {"lte rsrp"}) == ("time", "lte rsrp", "pci")
     assert with_served_names([*names, "rsrp"]) == ("time", "lte rsrp", "pci", "rsrp")
+
+
+@pytest.mark.parametrize(
+    ("names", "role"),
+    [
+        ("PCell RSRP,PCell PCI,PCell EARFCN", "serving"),
+        ("LTE RSRP,LTE PCI,LTE EARFCN", "neighbour"),
+    ],
+)
+def test_cells_without_an_identity_serve_where_their_columns_say_so(tmp_path, names, role):
+    found = read(tmp_path, f"time,lat,lon,{names}", "2026-05-13T08:00:00Z,60.17,24.94,-80,100")
+    assert found.tables["radio"]["role"].tolist() == [role]

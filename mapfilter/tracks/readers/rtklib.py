@@ -82,7 +82,7 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: 
 
 
 def _degrees(rows: Columns, name: str) -> Floats:
-    """Return a column of degrees, also of degrees, minutes and seconds; the sign is the degrees'."""
+    """Return degrees, also of degrees, minutes and seconds; the sign is that of the degrees."""
     if rows.has(name):
         return rows.number(name)
     degrees, minutes, seconds = (rows.number(f"{name}{part}") for part in _PARTS)

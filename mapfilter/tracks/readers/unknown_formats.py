@@ -32,6 +32,7 @@ _FIELD_OF_UNIT = {
 }
 """Fields that a column whose name is of another language may be, by its unit."""
 _ENDS = {"lat_deg": ("lat", "latitude"), "lon_deg": ("lon", "long", "lng", "longitude")}
+_NUMBER = re.compile(r"[+-]?\d{1,20}(?:[.,]\d{0,20})?", re.ASCII)
 _PARTED = re.compile(r"[._ :/]")
 """Last parts of names of columns, and what they are parted by."""
 _MESSAGES = "messages of an autopilot; export one kind as CSV (mavlogdump.py, types GPS)"
@@ -68,7 +69,7 @@ NOT_READ = {
     ".jsonl": _JSON,
     ".ndjson": _JSON,
     ".fit": "a FIT file; export GPX",
-    ".tcx": "a TCX file; export GPX",
+    ".tcx": "no TCX file with places; export GPX",
     ".igc": "an IGC file; export GPX",
     ".gpkg": "no GeoPackage; export its table as CSV",
     ".pos": "a solution of RTKLIB without its line of names; write it with its output header",
@@ -115,6 +116,8 @@ def unknown_format(
         hint = hint or NOT_READ[".json"]
     if is_table and not hint and _is_plan(names):
         hint = "a list of cells, no journey: name it as [cells] plan"
+    if is_table and not hint and _is_of_numbers(names):
+        hint = "a table without a line of names: write one above it, such as time,lat,lon,rsrp"
     if is_table and not hint:
         raw = {"databytes", "data bytes", "dlc"} & set(names) or {"id", "d1", "d2"} <= set(names)
         hint = RAW_FRAMES if raw else other_names(names)
@@ -122,6 +125,12 @@ def unknown_format(
     if is_table:
         got = f"none of them, but a table with the columns {listed([n for n in names if n])}"
     return fail(InputError, str(path), f"a recording in a known format ({_LIST})", got, hint)
+
+
+def _is_of_numbers(names: Sequence[str]) -> bool:
+    """Return whether most names of columns are numbers: values of the first row."""
+    numbers = sum(_NUMBER.fullmatch(name) is not None for name in names)
+    return 2 * numbers > len(names)
 
 
 def _is_plan(names: Sequence[str]) -> bool:

@@ -8,7 +8,7 @@ from pathlib import Path
 from mapfilter._inputs import open_input
 from mapfilter.tracks.readers.contained.android_cells import android_table, has_android_cells
 from mapfilter.tracks.readers.contained.json_tables import is_json, json_table
-from mapfilter.tracks.readers.contained.kml_tables import is_kml, kml_table
+from mapfilter.tracks.readers.contained.kml_tables import is_kml, is_tcx, kml_table, tcx_table
 from mapfilter.tracks.readers.contained.modem_lines import is_modem_log, modem_table
 from mapfilter.tracks.readers.plain.app_names import full_names
 from mapfilter.tracks.readers.plain.fields import usual_fields
@@ -20,7 +20,7 @@ from mapfilter.tracks.readers.texts.text import Text, read_text
 _WORKBOOKS = (".xlsx", ".xls", ".ods")
 _BEGINS_OF_WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 _LAYERS, _BEGINS_OF_LAYERS = (".gpkg",), (b"SQLite format 3\0",)
-OF_TABLES = (*_WORKBOOKS, *_LAYERS, ".json", ".jsonl", ".ndjson", ".geojson", ".kml")
+OF_TABLES = (*_WORKBOOKS, *_LAYERS, ".json", ".jsonl", ".ndjson", ".geojson", ".kml", ".tcx")
 """Suffixes of files that may hold a table in another form."""
 _HEAD_BYTES = 16
 _CELLS = {"ci", "cgi", "cell", "level_dbm"}
@@ -71,6 +71,8 @@ def _table_in(text: Text, is_known: Callable[[Text], bool], own: Collection[str]
         return android_table(text)
     if is_kml(text):
         return kml_table(text)
+    if is_tcx(text):
+        return tcx_table(text)
     if not is_known(text) and is_modem_log(text):
         return modem_table(text)
     return text

@@ -9,12 +9,15 @@ import numpy as np
 
 from mapfilter.errors import listed
 from mapfilter.tracks.readers.plain.date_parts import of_parts, parts_of_dates
-from mapfilter.tracks.readers.plain.served_names import with_served_names
+from mapfilter.tracks.readers.plain.served_names import states_serving, with_served_names
 from mapfilter.tracks.readers.texts.columns import Columns
 
 _FIT_EPOCH_S = 631_065_600
 """Unix time of 31 December 1989, from which FIT counts seconds."""
 _FIT_TIME = "record.timestamp[s]"
+_SECONDS = "header.stamp.sec"
+_ROS_2 = frozenset((_SECONDS, "header.stamp.nanosec"))
+"""The two parts of a time, as converters of bags of ROS 2 write them."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +81,18 @@ _PROGRAMS = (
             "%time": "time",
             **_axes("gyr", "angular_velocity"),
             **_axes("acc", "linear_acceleration"),
+        },
+    ),
+    _Program(
+        "columns as of messages of ROS 2",
+        _ROS_2,
+        {
+            _SECONDS: "time",
+            "header.stamp.nanosec": "",
+            "twist.twist.linear.x": "wheel speed [m/s]",
+            "twist.twist.angular.z": "yaw rate [rad/s]",
+            **{f"angular_velocity.{axis}": f"gyr_{axis}" for axis in "xyz"},
+            **{f"linear_acceleration.{axis}": f"acc_{axis}" for axis in "xyz"},
         },
     ),
     _Program(
@@ -226,9 +241,15 @@ def with_full_names(rows: Columns, own: Collection[str]) -> Columns:
         rows.reading.note(f"taken for those of the serving cell: {listed(renamed)}")
     if known is not None:
         rows.reading.note(known.note)
+        if known.marks >= _ROS_2:
+            seconds, nanoseconds = (rows.number(name) for name in sorted(_ROS_2, key=len))
+            rows = rows.filled(_SECONDS, _texts(seconds + nanoseconds / 1e9))
         if _FIT_TIME in known.marks and _FIT_TIME not in own:
             rows = rows.filled(_FIT_TIME, _texts(rows.number(_FIT_TIME) + _FIT_EPOCH_S))
-    return replace(parts_of_dates(rows, own), names=names)
+    found = replace(parts_of_dates(rows, own), names=names)
+    # A cell without an identity would be a neighbour.
+    states = any(map(states_serving, renamed)) and not found.has("role")
+    return found.with_column("role", "serving") if states else found
 
 
 def _program(names: Sequence[str]) -> _Program | None:

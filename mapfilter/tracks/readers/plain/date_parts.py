@@ -20,23 +20,24 @@ from mapfilter.tracks.readers.plain.headers import columns_of
 from mapfilter.tracks.readers.texts.columns import Columns
 
 _DATE = "date"
-_YEAR = ("year", "yyyy")
+_YEAR = ("year", "yyyy", "utc_year")
 _DAYS = (
-    (_YEAR, ("month",), ("day",)),
+    (_YEAR, ("month", "utc_month"), ("day", "utc_day")),
     (_YEAR, ("doy", "ddd", "day_of_year", "dayofyear", "day of year", "yday")),
     ((_DATE,),),
 )
-_HOUR, _MINUTE = ("hour", "hours", "hh"), ("min", "minute", "minutes", "mm")
+_HOUR = ("hour", "hours", "hh", "utc_hour")
+_MINUTE = ("min", "minute", "minutes", "mm", "utc_minute")
 _CLOCKS = (
-    (_HOUR, _MINUTE, ("sec", "second", "seconds", "ss")),
+    (_HOUR, _MINUTE, ("sec", "second", "seconds", "ss", "utc_second")),
     (_HOUR, _MINUTE),
     (("sod", "seconds_of_day", "second_of_day", "secofday", "seconds of day"),),
 )
 """Parts of days and of times of day; without seconds times are whole minutes."""
 _OF_SATELLITES = 1
 """Parts of a clock that is a count of seconds of the day."""
-_NANO = "nano"
-"""What a receiver of u-blox adds to its rounded seconds."""
+_NANOS = ("nano", "utc_nano")
+"""What a receiver of u-blox adds to its rounded seconds, and a sensor of Xsens to whole ones."""
 _UTC = "itow"
 _LAST = (23, 59, 60)
 _LAST_DAY, _LAST_SECOND = 366, 86_400
@@ -73,8 +74,9 @@ def of_parts(names: tuple[str, ...], own: Collection[str] = ()) -> tuple[str, ..
     day, clock = _columns(names, own)
     if not day:
         return names
-    utc, hour = _UTC in names or len(clock) == _OF_SATELLITES, clock[0]
-    nameless = {*day, *clock, *((_NANO, _UTC) if utc else ())} - {*own, hour}
+    hour = clock[0]
+    utc = _UTC in names or len(clock) == _OF_SATELLITES or hour.startswith("utc_")
+    nameless = {*day, *clock, *((*_NANOS, _UTC) if utc else ())} - {*own, hour}
     time = "time (utc)" if utc else "time"
     return tuple(time if name == hour else "" if name in nameless else name for name in names)
 
@@ -123,7 +125,8 @@ def _of_clock(rows: Columns, clock: Sequence[str]) -> Floats:
     for number, most in zip(numbers, _LAST, strict=False):
         good &= (number >= 0) & (number <= most)
     seconds = numbers[2] if len(numbers) == len(_LAST) else np.zeros(len(rows))
-    nano = rows.number(_NANO) if _UTC in rows.names and rows.has(_NANO) else np.zeros(len(rows))
+    utc = _UTC in rows.names or clock[0].startswith("utc_")
+    nano = rows.number(*_NANOS) if utc else np.zeros(len(rows))
     elapsed_s = (numbers[0] * 60 + numbers[1]) * 60 + seconds + np.nan_to_num(nano) / 1e9
     return np.where(good, elapsed_s, np.nan)
 

@@ -13,6 +13,7 @@ from mapfilter.tracks.readers.plain.served_names import served_name
 QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "time": (
         *("time", "timestamp", "date time", "local time", "unix time", "epoch time"),
+        *("event time", "message time", "measurement time", "record time", "log time", "fix time"),
         *("elapsed time", "time elapsed", "seconds elapsed", "device time", "gps time", "date"),
         *("tow", "gps tow", "time of week", "gps time of week"),
     ),
@@ -88,6 +89,8 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
 """Words for the quantity of a field, in any order; times of the first of several columns."""
 
 _ALSO_MEANT: Mapping[str, tuple[str, ...]] = {
+    "east_m": ("utm x", "utm east", "utm easting", "x utm"),
+    "north_m": ("utm y", "utm north", "utm northing", "y utm"),
     "cell": ("cell name", "cellname", "serving cell name", "transmitter"),
     "odometer_m": (
         *("distance", "trip distance", "total distance", "distance travelled", "trip"),

@@ -18,6 +18,9 @@ _TECHNOLOGIES = {
     **dict.fromkeys(("gsm", "2g"), "gsm"),
 }
 _SERVING = {"pcell", "pcc", "serving", "serv", "primary", "servingcell"}
+_ASIDE = {"kpi", "info", "smart", "phone"}
+"""Words that export formats add, and that tell nothing."""
+_JOINED = re.compile(r"^(serving|pcell)(?=(?:rsrp|rscp|pci|psc|earfcn|uarfcn|arfcn|tac|lac)$)")
 _MEANT = {
     **dict.fromkeys(("rsrp", "ss rsrp", "rscp"), "level [dbm]"),
     **dict.fromkeys(("pci", "physical cell id", "physical cell identity", "physcellid"), "pci"),
@@ -49,11 +52,14 @@ def served_name(column: str) -> str:
     --------
     >>> served_name("lte pcell rsrp"), served_name("pci (serving)"), served_name("nr-arfcn")
     ('level [dbm]', 'pci', 'nr_arfcn')
+    >>> served_name("servingrsrp"), served_name("smart phone lte serving cell info pci")
+    ('level [dbm]', 'pci')
     >>> served_name("lte scell1 rsrp"), served_name("rsrp"), served_name("serving cell")
     ('', '', '')
     """
     text, unit = parted_unit(column)
-    words = _WORD.findall(text)
+    words = _WORD.findall(_JOINED.sub(r"\1 ", text))
+    words = [word for word in words if word not in _ASIDE]
     # The cell of "serving cell rsrp" is no part of the quantity.
     beside = [at for at, word in enumerate(words) if word in _SERVING and word[-4:] != "cell"]
     dropped = {
@@ -71,6 +77,18 @@ def served_name(column: str) -> str:
         return ""
     technology = next((_TECHNOLOGIES[word] for word in words if word in _TECHNOLOGIES), "")
     return _OF_TECHNOLOGY.get((meant, technology), meant)
+
+
+def states_serving(column: str) -> bool:
+    """Return whether a name states that its column is of the serving cell, not a technology alone.
+
+    Examples
+    --------
+    >>> states_serving("lte pcell rsrp"), states_serving("lte rsrp")
+    (True, False)
+    """
+    words = _WORD.findall(_JOINED.sub(r"\1 ", column.lower()))
+    return any(word in _SERVING and word != "primary" for word in words)
 
 
 def with_served_names(names: Sequence[str], own: Collection[str] = ()) -> tuple[str, ...]:

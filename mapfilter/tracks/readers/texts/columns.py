@@ -226,6 +226,12 @@ class Columns:
         column = pa.chunked_array([pa.array(texts, pa.string())])
         return replace(self, _columns={**self._columns, self.names.index(name): column})
 
+    def with_column(self, name: str, text: str) -> Columns:
+        """Return columns with another one, which has the same text in each row."""
+        column = pa.chunked_array([pa.repeat(text, len(self))])
+        columns = {**self._columns, len(self.names): column}
+        return replace(self, names=(*self.names, name), _columns=columns)
+
     def number(self, *names: str) -> Floats:
         """Return the first of these columns that is there as numbers, NaN where missing.
 
