@@ -75,11 +75,7 @@ def test_columns_that_a_user_names_or_that_are_there_stay():
 
 
 @pytest.mark.parametrize(
-    ("names", "role"),
-    [
-        ("PCell RSRP,PCell PCI,PCell EARFCN", "serving"),
-        ("LTE RSRP,LTE PCI,LTE EARFCN", "neighbour"),
-    ],
+    ("names", "role"), [("PCell RSRP,PCell PCI", "serving"), ("LTE RSRP,LTE PCI", "neighbour")]
 )
 def test_cells_without_an_identity_serve_where_their_columns_say_so(tmp_path, names, role):
     found = read(tmp_path, f"time,lat,lon,{names}", "2026-05-13T08:00:00Z,60.17,24.94,-80,100")
