@@ -352,6 +352,24 @@ def test_figures_of_another_program_are_no_results(tmp_path):
     assert info(tmp_path)["kind"] == "recordings"
 
 
+def test_points_with_times_and_texts_of_cells_are_recordings(tmp_path):
+    """The former were streets only, the latter a table whose columns are its first line."""
+    at = {"type": "Point", "coordinates": [24.94, 60.17]}
+    point = {"type": "Feature", "properties": {"time": "2026-05-13T08:00:00Z"}, "geometry": at}
+    path = tmp_path / "drive.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": [point]}))
+    found = info(path)
+    assert (found["kind"], found["use"].rpartition("; ")[2]) == (
+        "layers",
+        "points with times: mapfilter replay --log, or mapfilter convert",
+    )
+    log = tmp_path / "log.txt"
+    log.write_text(
+        "05-13 11:00:00.123 1 1 D Own: [CellInfoLte:{CellIdentityLte:{ mCi=7, mPci=1}}]\n"
+    )
+    assert_refused(mapfilter("info", log), "a logcat without years")
+
+
 def test_a_zip_of_a_track_log_is_named_as_that(world, tmp_path):
     """Offsets were asked for its tables, and its tables were no recordings."""
     log = next(world.journeys.iterdir())

@@ -45,6 +45,7 @@ from mapfilter.tracks.readers.texts.separated_values import (
 )
 from mapfilter.tracks.readers.texts.text import Text, parts_of
 from mapfilter.tracks.readers.texts.title_lines import below_title
+from mapfilter.tracks.readers.texts.zipped import has_recording
 from mapfilter.tracks.readers.unknown_formats import JSON, NOT_READ, unknown_format
 
 FORMATS: tuple[Format, ...] = (
@@ -138,7 +139,7 @@ def read_recording(
         text = read_any(path, _is_known, own=options.columns.values() if options else ())
     except InputError as error:
         suffix = path.suffix.lower()
-        hint = NOT_READ.get(suffix, "")
+        hint = NOT_READ.get(suffix, "") if has_recording(path) else ""
         of_table = [f.hint if suffix in OF_TABLES else "" for f in error.faults]
         hints = [own or hint or f.hint for own, f in zip(of_table, error.faults, strict=True)]
         faults = zip(error.faults, hints, strict=True)

@@ -22,7 +22,7 @@ _BEGINS_OF_WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 _LAYERS, _BEGINS_OF_LAYERS = (".gpkg",), (b"SQLite format 3\0",)
 OF_TABLES = (*_WORKBOOKS, *_LAYERS, ".json", ".jsonl", ".ndjson", ".geojson", ".kml", ".tcx")
 """Suffixes of files that may hold a table in another form."""
-_HEAD_BYTES = 16
+_HEAD_BYTES, _PEEKED_ROWS = 16, 100
 _CELLS = {"ci", "cgi", "cell", "level_dbm"}
 
 
@@ -40,7 +40,7 @@ def read_any(
     is_known : callable
         Whether a text is of a format that is read as it is.
     most_bytes : int
-        As of :func:`read_text`; workbooks and layers are read as a whole.
+        As of :func:`read_text`; of a layer few rows then, and workbooks as a whole.
     own : collection of str
         Names of columns that a user gives fields.
 
@@ -58,7 +58,7 @@ def read_any(
     if suffix in _LAYERS and _begins(path, _BEGINS_OF_LAYERS):
         from mapfilter.tracks.readers.contained.workbooks import layer_of
 
-        return layer_of(path)
+        return layer_of(path, _PEEKED_ROWS if most_bytes >= 0 else -1)
     return _table_in(read_text(path, most_bytes), is_known, own)
 
 

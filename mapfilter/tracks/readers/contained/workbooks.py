@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyogrio
@@ -31,8 +33,10 @@ def sheet_of(path: Path) -> Text:
     return as_table(Text(path, b"", notes), table.header, rows, "workbook")
 
 
-def layer_of(path: Path) -> Text:
+def layer_of(path: Path, most_rows: int = -1) -> Text:
     """Return the points of a GeoPackage's layer, with longitude and latitude, as a text of CSV.
+
+    ``most_rows`` are read at most, all of them where it is negative.
 
     Raises
     ------
@@ -41,7 +45,9 @@ def layer_of(path: Path) -> Text:
     """
     source = vector_source(path)
     try:
-        with sealed_gdal():
+        with sealed_gdal(), warnings.catch_warnings():
+            # GDAL warns of much that it copes with.
+            warnings.simplefilter("ignore", RuntimeWarning)
             layers = [
                 str(name)
                 for name, kind in pyogrio.list_layers(source.path).tolist()
@@ -51,8 +57,9 @@ def layer_of(path: Path) -> Text:
                 got = ", ".join(layers)[:200] or "none"
                 hint = "export the one of the journey as CSV, GPX or a GeoPackage of its own"
                 raise fail(InputError, str(path), "one layer of points", got, hint)
-            frame = pyogrio.read_dataframe(source.path, layer=layers[0])
-    except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, ValueError) as error:
+            few = {} if most_rows < 0 else {"max_features": most_rows}
+            frame: Any = pyogrio.read_dataframe(source.path, layer=layers[0], **few)
+    except (RuntimeError, OSError, ValueError) as error:
         raise fail(InputError, str(path), "a GeoPackage that can be read", error) from error
     if frame.crs is None:
         raise fail(InputError, f"{path}, crs", "a CRS of the layer", "none")
