@@ -122,8 +122,9 @@ def _matches(text: Text) -> bool:
 def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     reading.program = "TEMS Investigation"
     rows = header_columns(text.data, reading, text.line)
+    own = any(name.startswith("all-") for name in rows.names)
     rows = replace(rows, names=tuple(_plain(name) for name in rows.names))
-    if not ({name.partition("[")[0] for name in rows.names} & _LEVELS or _matches(text)):
+    if not (own or {name.partition("[")[0] for name in rows.names} & _LEVELS or _matches(text)):
         expected = "elements of TEMS, such as All-Serving Cell RSRP (dBm)[1]"
         raise fail(InputError, f"{reading.path} header", expected, ", ".join(rows.names)[:200])
     time_s = _times(rows, reading, options)

@@ -60,7 +60,8 @@ def layer_of(path: Path, most_rows: int = -1) -> Text:
             few = {} if most_rows < 0 else {"max_features": most_rows}
             frame: Any = pyogrio.read_dataframe(source.path, layer=layers[0], **few)
     except (RuntimeError, OSError, ValueError) as error:
-        raise fail(InputError, str(path), "a GeoPackage that can be read", error) from error
+        got = str(error).partition(";")[0][:200].replace(f"'{path.absolute()}' ", "")
+        raise fail(InputError, str(path), "a GeoPackage that can be read", got) from error
     if frame.crs is None:
         raise fail(InputError, f"{path}, crs", "a CRS of the layer", "none")
     frame = frame.to_crs(_DEGREES)
