@@ -113,7 +113,8 @@ def _file_info(path: Path) -> dict[str, Any]:
     if suffix == ".parquet":
         whole = (path.parent / MANIFEST).exists()
         hint = "a part of a database; name the folder that it lies in"
-        hint = hint if whole else "pandas, geopandas and QGIS open it"
+        of_frame = f"pandas, geopandas and QGIS open it; of a journey: {_USE_OF_RECORDINGS}"
+        hint = hint if whole else of_frame
         raise fail(InputError, str(path), _EXPECTED, "a Parquet file", hint)
     if suffix in _LAYERS or (suffix == ".json" and _is_geojson(path)):
         from mapfilter.tracks.readers.formats import format_of

@@ -4,6 +4,7 @@ import json
 
 import geopandas
 import numpy as np
+import pandas as pd
 import pytest
 import shapely
 from made_workbook import workbook
@@ -269,3 +270,25 @@ def test_points_of_tcx(tmp_path):
     assert positions["speed_mps"].tolist() == [8.0] * 5
     with pytest.raises(InputError, match="recorded indoors"):
         read(tmp_path, "run.tcx", TCX.format(indoors))
+
+
+@pytest.mark.parametrize("zone", ["UTC", "Europe/Helsinki", None])
+def test_a_data_frame_in_parquet(tmp_path, zone):
+    """It was refused, and converting it to CSV left to the reader."""
+    time = pd.to_datetime([START_S + at for at in ROWS], unit="s", utc=True)
+    time = time.tz_convert(zone) if zone else time.tz_localize(None)
+    table = {"lat": LAT_DEG, "lon": 24.94, "rsrp": [-80, None, -82, -83, -84], "ci": [123] * 5}
+    frame = pd.DataFrame({**table, "role": pd.Categorical(["serving"] * 5), "x": [[1]] * 5})
+    path = tmp_path / "drive.parquet"
+    for index in (False, True):
+        given = frame.set_index(time) if index else frame.assign(time=time)
+        given.to_parquet(path)
+        found = read_recording(path)
+        assert_placed(found, ["1 column without single values left out"])
+        assert found.tables["radio"]["level_dbm"].tolist()[2:] == [-82.0, -83.0, -84.0]
+        assert found.clock.kind == ("utc" if zone else "local")
+    # Beside others it may be a part of a result.
+    assert format_of(path) is None
+    path.write_bytes(path.read_bytes()[:200])
+    with pytest.raises(InputError, match="a Parquet file that can be read"):
+        read_recording(path)

@@ -20,7 +20,18 @@ from mapfilter.tracks.readers.texts.text import Text, read_text
 _WORKBOOKS = (".xlsx", ".xls", ".ods")
 _BEGINS_OF_WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 _LAYERS, _BEGINS_OF_LAYERS = (".gpkg",), (b"SQLite format 3\0",)
-OF_TABLES = (*_WORKBOOKS, *_LAYERS, ".json", ".jsonl", ".ndjson", ".geojson", ".kml", ".tcx")
+_FRAMES, _BEGINS_OF_FRAMES = (".parquet", ".pq"), (b"PAR1",)
+OF_TABLES = (
+    *_WORKBOOKS,
+    *_LAYERS,
+    *_FRAMES,
+    ".json",
+    ".jsonl",
+    ".ndjson",
+    ".geojson",
+    ".kml",
+    ".tcx",
+)
 """Suffixes of files that may hold a table in another form."""
 _HEAD_BYTES, _PEEKED_ROWS = 16, 100
 _CELLS = {"ci", "cgi", "cell", "level_dbm"}
@@ -59,6 +70,11 @@ def read_any(
         from mapfilter.tracks.readers.contained.workbooks import layer_of
 
         return layer_of(path, _PEEKED_ROWS if most_bytes >= 0 else -1)
+    # Of many in a folder, as parts of results, none is a journey unless it is named.
+    if suffix in _FRAMES and most_bytes < 0 and _begins(path, _BEGINS_OF_FRAMES):
+        from mapfilter.tracks.readers.contained.data_frames import frame_of
+
+        return frame_of(path)
     return _table_in(read_text(path, most_bytes), is_known, own)
 
 
