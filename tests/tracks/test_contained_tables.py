@@ -5,6 +5,8 @@ import json
 import geopandas
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 import shapely
 from made_workbook import workbook
@@ -292,3 +294,31 @@ def test_a_data_frame_in_parquet(tmp_path, zone):
     path.write_bytes(path.read_bytes()[:200])
     with pytest.raises(InputError, match="a Parquet file that can be read"):
         read_recording(path)
+
+
+def test_geojson_of_an_estimate_is_no_recording(tmp_path):
+    features = [
+        {"type": "Feature", "geometry": {"type": "Point", "coordinates": [24.94, LAT_DEG[at]]},
+         "properties": {"time_s": at, "filter": "bayes", "status": "LOST", "radius_95_m": 9.0}}
+        for at in ROWS
+    ]  # fmt: skip
+    layer = json.dumps({"type": "FeatureCollection", "features": features})
+    with pytest.raises(InputError, match="what a filter estimated"):
+        read(tmp_path, "estimate.geojson", layer)
+
+
+def test_parquet_of_mapfilter_itself_is_no_recording(tmp_path):
+    """Positions that a filter estimated would be taken for fixes."""
+    frame = pd.DataFrame({"time": ISO, "lat": LAT_DEG, "lon": 24.94})
+    path = tmp_path / "estimate.parquet"
+    table = pa.Table.from_pandas(frame)
+    pq.write_table(table.replace_schema_metadata({"mapfilter": "{}"}), path)
+    with pytest.raises(InputError, match="what a filter estimated"):
+        read_recording(path)
+    frame.to_parquet(path)
+    assert_placed(read_recording(path))
+    for head in ("log.json", "manifest.json"):
+        (tmp_path / head).write_text("{}")
+        with pytest.raises(InputError, match="name the folder that it lies in"):
+            read_recording(path)
+        (tmp_path / head).unlink()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import pyarrow as pa
@@ -15,6 +16,8 @@ from mapfilter.tracks.readers.contained.tables import as_table
 from mapfilter.tracks.readers.texts.text import Text
 
 _MOST_VALUES = 50_000_000
+_OWN, _HEADS = b"mapfilter", ("log.json", "manifest.json")
+"""What marks an estimate, and what lies beside the tables of a log and of a database."""
 _INDEX = "__index_level_0__"
 
 
@@ -31,6 +34,7 @@ def frame_of(path: Path) -> Text:
     try:
         with open_input(path) as stream, open_parquet(stream) as file:
             rows, names = file.footer.num_rows, file.columns
+            _check_foreign(path, file.footer.metadata or {})
             if rows * len(names) > _MOST_VALUES:
                 got = f"{rows} rows of {len(names)} columns"
                 raise fail(InputError, str(path), "a table of at most 5e7 values", got)
@@ -53,6 +57,16 @@ def frame_of(path: Path) -> Text:
     lists = [column.to_pylist() for column in columns.values()]
     made = (list(row) for row in zip(*lists, strict=True))
     return as_table(Text(path, b"", notes), list(columns), made, "Parquet")
+
+
+def _check_foreign(path: Path, metadata: Mapping[bytes, bytes]) -> None:
+    """Refuse what mapfilter wrote: a table of a log, a part of a database, or an estimate."""
+    if _OWN in metadata:
+        hint = "what a filter estimated; it is no recording, nor a ground truth"
+        raise fail(InputError, str(path), "a recording", "an estimate of mapfilter", hint)
+    if any((path.parent / name).is_file() for name in _HEADS):
+        hint = "a part of a log or a database; name the folder that it lies in"
+        raise fail(InputError, str(path), "a recording", "a table of mapfilter", hint)
 
 
 def _is_of_values(kind: pa.DataType) -> bool:

@@ -26,6 +26,7 @@ _OF_KINDS: Mapping[str, tuple[str, ...]] = {"class": ("TPV",), "_type": ("locati
 _CRS = re.compile(
     r"\"crs\"\s{0,9}:\s{0,9}\{[^{}]{0,99}\{[^{}]{0,99}?\"name\"\s{0,9}:\s{0,9}\"([^\"]{0,99})"
 )
+_OF_ESTIMATES = {"filter", "status", "radius_95_m"}
 _OF_DEGREES = re.compile(r"CRS84|EPSG:{1,2}4326|OGC:1\.3:CRS84", re.IGNORECASE)
 
 
@@ -56,6 +57,9 @@ def json_table(text: Text) -> Text | None:
     rows = [row for record in records for row in _rows(_with_place(record), text)]
     if not any(rows):
         return None
+    if {path[-1] for row in rows for path in row} >= _OF_ESTIMATES:
+        hint = "what a filter estimated; it is no recording, nor a ground truth"
+        raise fail(InputError, str(text.path), "a recording", "an estimate of mapfilter", hint)
     notes = [
         f"{number_of(n, f'record of {kind}', f'records of {kind}')} left out" for kind, n in left
     ]
