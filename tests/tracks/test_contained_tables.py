@@ -245,7 +245,9 @@ def test_a_layer_of_points(tmp_path):
 
 
 def test_other_json_is_no_recording(tmp_path):
-    for content in ('{"version": 2, "crs": "EPSG:3067"}', '[{"time": 1}]', "[1, 2]", '{"lat": 1}'):
+    wide = json.dumps({f"{at}": {"lat": 60.0, "lon": 24.0, "time": at} for at in range(20_000)})
+    plain = '{"version": 2, "crs": "EPSG:3067"}'
+    for content in (plain, '[{"time": 1}]', "[1, 2]", '{"lat": 1}', wide):
         path = tmp_path / "own.json"
         path.write_text(content)
         assert format_of(path) is None

@@ -20,7 +20,7 @@ _LINE_BEGINS = re.compile(rb"[^{}\[\]\"\n]{1,80}\{\"")
 _LIST = re.compile(r"\"(\w{1,40})\"\s{0,20}:\s{0,20}\[\s{0,40}(?=\{)")
 _BLANK = re.compile(r"[\s,]*")
 _LARGEST_BYTES = 1 << 28
-_DEEPEST = 8
+_DEEPEST, _MOST_COLUMNS = 8, 1000
 _OF_KINDS: Mapping[str, tuple[str, ...]] = {"class": ("TPV",), "_type": ("location",)}
 """Names by which programs tell their kinds of records (gpsd, OwnTracks), and the kinds to read."""
 _CRS = re.compile(

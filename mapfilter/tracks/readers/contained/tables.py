@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -47,9 +48,8 @@ def names_of(paths: Sequence[Path_]) -> dict[Path_, str]:
     >>> list(names_of([("time",), ("gps", "lat"), ("a", "x"), ("b", "x")]).values())
     ['time', 'lat', 'a.x', 'b.x']
     """
-    ends = [path[-1].lower() for path in paths]
-    once = {end for end in ends if ends.count(end) == 1}
-    return {path: path[-1] if path[-1].lower() in once else ".".join(path) for path in paths}
+    count = Counter(path[-1].lower() for path in paths)
+    return {path: path[-1] if count[path[-1].lower()] == 1 else ".".join(path) for path in paths}
 
 
 def table_of_records(text: Text, records: Sequence[Mapping[Path_, str]], what: str) -> Text:
