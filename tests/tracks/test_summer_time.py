@@ -8,10 +8,10 @@ import pandas as pd
 import pytest
 
 import mapfilter as mf
+from mapfilter.clocks.local_times import utc_from_local_s
+from mapfilter.clocks.times import parse_times
 from mapfilter.errors import InputError
 from mapfilter.tracks.readers import gpx
-from mapfilter.tracks.readers.clocks.local_times import utc_from_local_s
-from mapfilter.tracks.readers.clocks.times import parse_times
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.readers.texts import lines, text

@@ -10,6 +10,7 @@ import pandas as pd
 
 from mapfilter._constants import DAY_S
 from mapfilter._types import Floats
+from mapfilter.clocks.times import are_days
 from mapfilter.errors import Faults
 from mapfilter.lattice import Lattice
 from mapfilter.tracks.checks.clock_notes import week_fault
@@ -17,7 +18,6 @@ from mapfilter.tracks.checks.exchanged import sideways_mps2
 from mapfilter.tracks.checks.misplaced import FAR_M, misplaced_by
 from mapfilter.tracks.checks.second_deliveries import once_each
 from mapfilter.tracks.joining.moved import UNDIRECTED
-from mapfilter.tracks.readers.clocks.times import are_days
 
 # Tables may begin this long after another ends.
 _APART_S = 600.0

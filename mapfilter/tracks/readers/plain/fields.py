@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Collection, Mapping, Sequence
 from difflib import SequenceMatcher, get_close_matches
+from itertools import permutations
 
 from mapfilter._header_units import parted_unit
 from mapfilter.errors import Faults
@@ -28,17 +29,23 @@ _UNIT_WORDS = {
     "odometer_m": "m",
 }
 """Units of fields by their endings, in words."""
+_CODES = tuple("/".join(some) for n in (2, 3) for some in permutations(("pci", "psc", "bsic"), n))
+"""Names of a column of codes of several technologies."""
 _NAMES: Mapping[str, tuple[str, ...]] = {
     "time": (
         *("time", "time_s", "timestamp", "datetime", "utc", "unix_time", "date_time", "t"),
         *("timestamps", "timestep_time", "time_utc_usec"),
+        *("ts", "time_stamp", "epoch", "unix_timestamp"),
         *("measured_at", "recorded_at", "tow", "tow_s", "gps_tow", "time_of_week"),
         "yyyy-mo-dd hh-mi-ss_sss",
     ),
-    "lat_deg": ("lat_deg", "lat", "latitude", "location latitude :"),
+    "lat_deg": (
+        *("lat_deg", "lat", "latitude", "location latitude :"),
+        *("gps_latitude", "gps_lat", "gnss_latitude", "gnss_lat"),
+    ),
     "lon_deg": (
-        *("lon_deg", "lon", "lng", "long", "longitude", "longtitude"),
-        "location longitude :",
+        *("lon_deg", "lon", "lng", "long", "longitude", "longtitude", "location longitude :"),
+        *("gps_longitude", "gps_lon", "gps_long", "gps_lng", "gnss_longitude", "gnss_lon"),
     ),
     "altitude_m": ("altitude_m", "altitude", "ele", "height_m"),
     "accuracy_m": ("accuracy_m", "accuracy"),
@@ -76,7 +83,7 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
     "enodeb": ("enodeb", "enodeb_id", "enodebid", "enb", "enb_id", "enbid"),
     "sector": ("sector", "sector_id", "sectorid", "cell_number", "local_cell_id", "lcid"),
     "arfcn": ("arfcn", "uarfcn", "earfcn", "nrarfcn", "nr_arfcn", "narfcn"),
-    "bsic": ("bsic", "psc", "pci", "psc_or_pci", "pci_psc"),
+    "bsic": ("bsic", "psc", "pci", "psc_or_pci", "pci_psc", *_CODES),
     "level_dbm": (
         *("level_dbm", "dbm", "rsrp", "rscp", "rssi", "signal_dbm", "ss_rsrp", "ssrsrp"),
     ),
