@@ -31,12 +31,12 @@ from mapfilter.positioning.kalman.coast import Coast
 from mapfilter.positioning.kalman.lasting import Motion
 from mapfilter.positioning.kalman.understated import Understated
 
-_APART_S, _YOUNGEST_S, _OLDEST_S, _KEPT_S = 30.0, 55.0, 240.0, 600.0
+_APART_S, _YOUNGEST_S, _OLDEST_S, _KEPT_S = 30.0, 55.0, 150.0, 600.0
 """Time between two beliefs that are kept, ages at which they are compared, and for how long one is
 kept that contradicts fixes: spoofing ends some time, and steps that were wrong are right again."""
-_LED, _RETURNED, _RETURNS_S = 1e-3, 0.2, 90.0
+_LED, _RETURNED, _RETURNS_S = 3e-3, 0.2, 90.0
 """Prior odds that fixes are wrong: usual ones, and ones that come back after a gap, which fade."""
-_PROVEN_S = 120.0
+_PROVEN_S = 300.0
 """Time for which fixes and steps have to agree on the way until both are right again."""
 _GAP_S, _LONGER = 20.0, 3.0
 """Time without a fix that is a gap, and how much longer than that between the last two it is."""
@@ -79,10 +79,8 @@ class Coasting(EqualByValue):
         What is known of that; it is not used while fixes may lead away.
     returned_s : float
         When fixes last came back after a gap; NaN where there was none.
-    fixed_s : float
-        Time of the last fix.
-    apart_s : float
-        Time between the last two.
+    usual_s : float
+        Time between the last two fixes.
     apart : Separation
         The belief without fixes that contradicts them most.
     is_held : bool
@@ -97,12 +95,18 @@ class Coasting(EqualByValue):
     times: float = 1.0
     learnt: Understated = field(default_factory=Understated)
     returned_s: float = nan
-    fixed_s: float = nan
-    apart_s: float = 0.0
+    usual_s: float = 0.0
     apart: Separation = field(default_factory=Separation)
     is_held: bool = False
     is_turned: bool = False
     agrees_s: float = nan
+
+    def begun_anew(self) -> Coasting:
+        """Return it where the belief begins anew as steps were wrong.
+
+        So it seems, too, where fixes that lead away go on while one rests.
+        """
+        return self if self.is_held else self.broken_off()
 
     def broken_off(self) -> Coasting:
         """Return it where fixes and steps agree again."""
@@ -120,7 +124,12 @@ class Coasting(EqualByValue):
         return replace(self, kept=tuple(one.moved(motion) for one in self.kept), apart=apart)
 
     def compared(
-        self, time_s: float, place_m: Floats, stated_m2: Floats, predicted: Gaussian
+        self,
+        time_s: float,
+        place_m: Floats,
+        stated_m2: Floats,
+        predicted: Gaussian,
+        since_s: float,
     ) -> Coasting:
         """Return it at a fix.
 
@@ -131,15 +140,16 @@ class Coasting(EqualByValue):
         stated_m2 : (2, 2) array
         predicted : Gaussian
             The belief before it, in the layout of dead reckoning.
+        since_s : float
+            Time since the fix before; NaN for the first.
         """
         kept, returned_s = self.kept, self.returned_s
-        since_s = time_s - self.fixed_s
-        if since_s > max(_GAP_S, _LONGER * self.apart_s):
+        if since_s > max(_GAP_S, _LONGER * self.usual_s):
             returned_s = time_s
             kept = (*kept, Coast.of(time_s, predicted, self.times, place_m))
         kept = tuple(one for one in kept if time_s - one.begun_s <= _OLDEST_S)
-        after = replace(self, kept=kept, returned_s=returned_s, fixed_s=time_s)
-        after = replace(after, apart_s=since_s if since_s > 0 else self.apart_s)
+        usual_s = since_s if since_s > 0 else self.usual_s
+        after = replace(self, kept=kept, returned_s=returned_s, usual_s=usual_s)
         held = self.apart.coast if self.is_held else None
         if held is not None and time_s - held.begun_s > _KEPT_S:
             return after.broken_off()
@@ -214,9 +224,9 @@ class Coasting(EqualByValue):
         """Whether fixes agree again with a belief without them that they had contradicted."""
         return self.is_held and self.apart.probability < _AGREES
 
-    def takes_over(self, place_m: Floats, stated_m2: Floats, other_m: Floats) -> bool:
+    def is_known(self, place_m: Floats, stated_m2: Floats, other_m: Floats) -> bool:
         """Return whether that belief is at a fix, and so well known that another place is not."""
-        if not self.is_back or self.apart.coast is None:
+        if self.apart.coast is None:
             return False
         off_m, right_m2 = self.apart.coast.off(place_m, stated_m2)
         apart_m = float(np.hypot(*(other_m - place_m)))

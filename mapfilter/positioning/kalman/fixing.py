@@ -39,6 +39,9 @@ _UNSEEN_S = 20.0
 """Time without a fix after which one that contradicts the belief is as likely to be right."""
 _SETTLED = 10
 """Fixes that agreed with a belief, from which on it goes on without them, too."""
+_RETURNED = 3
+"""Fixes in a row that contradict a belief, and agree with one that is older than what it has
+followed, from which on they are right."""
 _FREER_MPS_PER_SQRT_S = 4.0
 """Random walk of the speed of a vehicle that brakes and turns: some 1.3 m/s² for 5 s."""
 _SHARE = 0.5
@@ -168,23 +171,26 @@ class FixWeighing:
             if own is not MOVING and not rests and not is_doubted:
                 coasting, given = errors.coasting, (time_s, place_m, stated)
                 if found.ruling in (Ruling.AGREES, Ruling.EITHER):
-                    coasting = coasting.compared(*given, self._own(belief))
+                    own_belief, since_s = self._own(belief), time_s - errors.fixed_s
+                    coasting = coasting.compared(*given, own_belief, since_s)
                 else:
                     coasting = coasting.again(*given)
                 if coasting.is_back and found.ruling is Ruling.AGREES:
                     # They have come back by and by: errors that change, and no spoofer.
                     coasting = coasting.broken_off()
-                elif len(record.rows) != 1 and coasting.takes_over(
-                    place_m, stated, moments.mean[where]
-                ):
-                    onto = self._regained(coasting, lasting_m)
-                    belief, motion = belief.predict(*onto), after_each_other(motion, onto)
-                    record, found = FixRecord(), FixVerdict(Ruling.AGREES, nan)
-                    errors = errors._replace(wander=FixWander(), doubt=Doubt.NONE)
-                    coasting = coasting.regained()
+                elif coasting.is_back and len(record.rows) != 1:
+                    if coasting.is_known(place_m, stated, moments.mean[where]):
+                        onto = self._regained(coasting, lasting_m)
+                        belief, motion = belief.predict(*onto), after_each_other(motion, onto)
+                        record, found = FixRecord(), FixVerdict(Ruling.AGREES, nan)
+                        errors = errors._replace(wander=FixWander(), doubt=Doubt.NONE)
+                    elif len(record.rows) >= _RETURNED:
+                        record, found = record.anew(), FixVerdict(Ruling.ANEW, found.squared)
+                    if found.ruling is not Ruling.OUTLIER:
+                        coasting = coasting.regained()
                 errors = errors._replace(coasting=coasting)
             elif found.ruling.begins:
-                errors = errors._replace(coasting=errors.coasting.broken_off())
+                errors = errors._replace(coasting=errors.coasting.begun_anew())
             if found.ruling.begins:
                 white = white_part(noise, wanted_m) if self._lasts else noise
                 # Of two places that are as likely as each other the middle, out to both.
@@ -196,7 +202,7 @@ class FixWeighing:
                 if found.ruling is Ruling.ANEW and own is not MOVING:
                     errors = errors._replace(doubt=Doubt.UNTIL_PROVEN)
                 led = found.drifted or found.ruling is Ruling.EITHER
-                if not led:
+                if not led and found.ruling is not Ruling.CARRIED:
                     errors = errors._replace(coasting=errors.coasting.broken_off())
                 belief = belief.predict(*motion)
                 return WeighedFix(

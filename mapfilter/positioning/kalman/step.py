@@ -241,7 +241,7 @@ class KalmanStep:
             self.belief, motion = self.belief.predict(*doubt), after_each_other(motion, doubt)
         if self.own is RECKONED and isinstance(found, Direction):
             turned = turned_to(found, layout)
-            self.fixes = self.fixes._replace(coasting=self.fixes.coasting.broken_off())
+            self.fixes = self.fixes._replace(coasting=self.fixes.coasting.begun_anew())
             self.belief, motion = self.belief.predict(*turned), after_each_other(motion, turned)
         if self.motion is not None:
             self.motion = after_each_other(self.motion, motion)
