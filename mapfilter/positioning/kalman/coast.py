@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,9 @@ import numpy as np
 from mapfilter._types import Floats
 from mapfilter.filters.gaussian import Gaussian
 from mapfilter.positioning.kalman.lasting import Motion
+
+_TURNED, _SCALE = 2, 3
+"""Components that are the heading error and the share by which steps are too short."""
 
 
 class Coast(NamedTuple):
@@ -41,13 +45,25 @@ class Coast(NamedTuple):
         mean, covariance = belief.mean, belief.covariance
         return cls(time_s, mean, covariance, covariance[:2, :2], times, mean[:2], fix_m)
 
-    def moved(self, motion: Motion) -> Coast:
-        """Return it after motion of dead reckoning."""
+    def moved(self, motion: Motion, about: Floats) -> Coast:
+        """Return it after motion that is linear about another mean.
+
+        Where headings seem to have jumped that one may be far: the way is turned and drawn out.
+        """
         transition, noise, shift = motion
-        return self._replace(
-            mean=transition @ self.mean + shift,
-            covariance=transition @ self.covariance @ transition.T + noise,
+        after, other = transition @ self.mean + shift, transition @ about + shift
+        by_rad, longer = (
+            after[_TURNED] - other[_TURNED],
+            (1 + self.mean[_SCALE]) / (1 + about[_SCALE]),
         )
+        east, north = longer * cos(by_rad), longer * sin(by_rad)
+        turned = np.eye(self.mean.size)
+        turned[:2, :2] = [[east, -north], [north, east]]
+        after[:2] = self.mean[:2] + turned[:2, :2] @ (other - about)[:2]
+        own = transition.copy()
+        own[:2, 2:] = turned[:2, :2] @ transition[:2, 2:]
+        covariance = own @ self.covariance @ own.T + turned @ noise @ turned.T
+        return self._replace(mean=after, covariance=covariance)
 
     def beside(self, place_m: Floats) -> tuple[Floats, Floats]:
         """Return how far the way to a fix is from that of motion, and the covariance of motion."""

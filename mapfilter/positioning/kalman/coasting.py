@@ -30,14 +30,17 @@ from mapfilter.filters.gaussian import Gaussian
 from mapfilter.positioning.kalman.coast import Coast
 from mapfilter.positioning.kalman.lasting import Motion
 from mapfilter.positioning.kalman.understated import Understated
+from mapfilter.positioning.sensors.pace import WALKERS_MPS
 
 _APART_S, _YOUNGEST_S, _OLDEST_S, _KEPT_S = 30.0, 55.0, 150.0, 600.0
 """Time between two beliefs that are kept, ages at which they are compared, and for how long one is
 kept that contradicts fixes: spoofing ends some time, and steps that were wrong are right again."""
 _LED, _RETURNED, _RETURNS_S = 3e-3, 0.2, 90.0
 """Prior odds that fixes are wrong: usual ones, and ones that come back after a gap, which fade."""
-_PROVEN_S = 300.0
-"""Time for which fixes and steps have to agree on the way until both are right again."""
+_WALKED_S, _DRIVEN_S, _LOOKED_S = 30.0, 300.0, 180.0
+"""Time for which fixes and steps have to agree on the way until both are right again: beside a
+vehicle's way one that is led away by a walker's speed is hardly drawn out. Age of a belief without
+fixes up to which such a way is mostly that of before."""
 _GAP_S, _LONGER = 20.0, 3.0
 """Time without a fix that is a gap, and how much longer than that between the last two it is."""
 _WRONG_M2, _MOST_NATS = 60.0**2 * np.eye(2), 50.0
@@ -85,8 +88,6 @@ class Coasting(EqualByValue):
         The belief without fixes that contradicts them most.
     is_held : bool
         Whether it has contradicted them so much that it stays until they agree with it again.
-    is_turned : bool
-        Whether headings seem to have jumped since.
     agrees_s : float
         Since when fixes have lain where steps lead; NaN where they do not.
     """
@@ -98,7 +99,6 @@ class Coasting(EqualByValue):
     usual_s: float = 0.0
     apart: Separation = field(default_factory=Separation)
     is_held: bool = False
-    is_turned: bool = False
     agrees_s: float = nan
 
     def begun_anew(self) -> Coasting:
@@ -110,18 +110,16 @@ class Coasting(EqualByValue):
 
     def broken_off(self) -> Coasting:
         """Return it where fixes and steps agree again."""
-        return replace(
-            self, kept=(), apart=Separation(), is_held=False, is_turned=False, agrees_s=nan
-        )
+        return replace(self, kept=(), apart=Separation(), is_held=False, agrees_s=nan)
 
-    def moved(self, motion: Motion) -> Coasting:
-        """Return it after motion of dead reckoning."""
+    def moved(self, motion: Motion, about: Floats) -> Coasting:
+        """Return it after motion of dead reckoning, linear about a mean."""
         if not self.kept and self.apart.coast is None:
             return self
         apart, coast = self.apart, self.apart.coast
         if coast is not None:
-            apart = apart._replace(coast=coast.moved(motion))
-        return replace(self, kept=tuple(one.moved(motion) for one in self.kept), apart=apart)
+            apart = apart._replace(coast=coast.moved(motion, about))
+        return replace(self, kept=tuple(one.moved(motion, about) for one in self.kept), apart=apart)
 
     def compared(
         self,
@@ -199,18 +197,23 @@ class Coasting(EqualByValue):
             return after
         return replace(after, kept=(*self.kept, Coast.of(time_s, belief, after.times, seen_m)))
 
-    def along(self, time_s: float, agrees: bool | None) -> Coasting:
-        """Return it after a fix, by whether fixes lie where steps lead, by some angle.
+    def along(self, time_s: float, agrees: bool | None, mps: float) -> Coasting:
+        """Return it after a fix, by whether fixes lie where steps lead, turned by some angle.
 
-        None is where that cannot be told. Where headings seem to have jumped, that shows it;
-        else steps were wrong for a while.
+        Parameters
+        ----------
+        time_s : float
+        agrees : bool or None
+            None where it cannot be told.
+        mps : float
+            The usual speed.
         """
-        if not self.is_held or agrees is None:
+        if not self.is_held or self.apart.coast is None or agrees is None:
             return self
-        if not agrees:
+        if not agrees or time_s - self.apart.coast.begun_s < _LOOKED_S:
             return replace(self, agrees_s=nan)
         since_s = time_s if isnan(self.agrees_s) else self.agrees_s
-        if self.is_turned or time_s - since_s >= _PROVEN_S:
+        if time_s - since_s >= (_DRIVEN_S if mps > WALKERS_MPS else _WALKED_S):
             return self.broken_off()
         return replace(self, agrees_s=since_s)
 

@@ -6,13 +6,14 @@ from dataclasses import replace
 from math import hypot, nan, sqrt
 from typing import NamedTuple
 
+from mapfilter._types import Floats
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.gnss.wander import FixWander, Way
 from mapfilter.positioning.kalman.coasting import Coasting
 from mapfilter.positioning.kalman.disputed import FixRecord
 from mapfilter.positioning.kalman.lasting import Motion
 from mapfilter.positioning.kalman.models import KalmanOptions
-from mapfilter.positioning.kalman.proof import Doubt, way_agrees
+from mapfilter.positioning.kalman.proof import Doubt, usual_mps, way_agrees
 from mapfilter.positioning.kalman.turned import Lasting
 
 _PROVEN_S, _PROVEN_FIXES = 120.0, 10
@@ -77,9 +78,9 @@ class FixErrors(NamedTuple):
         east_m, north_m = self.way.east_m + east_m, self.way.north_m + north_m
         return self._replace(way=Way(east_m, north_m, self.way.gaps + gaps))
 
-    def coasted(self, motion: Motion) -> FixErrors:
-        """Return them after motion of dead reckoning, for beliefs without the last fixes."""
-        coasting = self.coasting.moved(motion)
+    def coasted(self, motion: Motion, about: Floats) -> FixErrors:
+        """Return them after motion of dead reckoning, linear about a mean."""
+        coasting = self.coasting.moved(motion, about)
         return self if coasting is self.coasting else self._replace(coasting=coasting)
 
     def at_time(self, time_s: float) -> FixErrors:
@@ -104,7 +105,7 @@ class FixErrors(NamedTuple):
         leads = self.coasting.is_held
         doubt = Doubt.UNTIL_PROVEN if leads else max(self.doubt, Doubt.IF_CONTRADICTED)
         record, wander = replace(self.record, rows=()), self.wander.broken_off()
-        coasting = replace(self.coasting, is_turned=True) if leads else self.coasting.broken_off()
+        coasting = self.coasting.begun_anew()
         return self._replace(record=record, wander=wander, doubt=doubt, coasting=coasting)
 
     def after_fix(self, lasting_m: float, record: FixRecord, time_s: float) -> FixErrors:
@@ -125,7 +126,10 @@ class FixErrors(NamedTuple):
         if self.doubt is Doubt.NONE and not is_held:
             return self._replace(doubted_s=time_s)
         agrees = way_agrees(self.wander.rows, self.understated, lasting_s)
-        after = self._replace(coasting=self.coasting.along(time_s, agrees)) if is_held else self
+        after = self
+        if is_held and self.wander.rows:
+            mps = usual_mps(self.wander.rows)
+            after = self._replace(coasting=self.coasting.along(time_s, agrees, mps))
         if self.doubt is Doubt.NONE:
             return after._replace(doubted_s=time_s)
         lasted_s = time_s - max(self.doubted_s, self.record.agreed_from_s)

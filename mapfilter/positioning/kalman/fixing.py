@@ -37,8 +37,8 @@ _RECKONED, _MOVING = Patience(30.0, 120.0), Patience(5.0, 5.0)
 """With dead reckoning, and where but a velocity is known."""
 _UNSEEN_S = 20.0
 """Time without a fix after which one that contradicts the belief is as likely to be right."""
-_SETTLED = 10
-"""Fixes that agreed with a belief, from which on it goes on without them, too."""
+_SETTLED, _DOUBTFUL = 10, 60
+"""Fixes that agreed with a belief, from which on it goes on without them, too; of one in doubt."""
 _RETURNED = 3
 """Fixes in a row that contradict a belief, and agree with one that is older than what it has
 followed, from which on they are right."""
@@ -237,8 +237,8 @@ class FixWeighing:
 
     def _coasts(self, errors: FixErrors) -> bool:
         """Return whether a belief is settled, and dead reckoning would go on with it alone."""
-        settled = errors.record.agreed >= _SETTLED and errors.doubt is Doubt.NONE
-        return self.own is not MOVING and settled
+        needed = _SETTLED if errors.doubt is Doubt.NONE else _DOUBTFUL
+        return self.own is not MOVING and errors.record.agreed >= needed
 
     def _own(self, belief: SumBelief) -> Gaussian:
         """Return a belief without what is behind position and errors of dead reckoning."""
