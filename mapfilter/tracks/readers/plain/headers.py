@@ -7,7 +7,8 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import TypeAlias
 
 from mapfilter._header_units import UNITS, parted_unit, quantity_of
-from mapfilter.tracks.readers.plain.fields import FIELDS, is_of_axis, meant
+from mapfilter.tracks.readers.plain.fields import FIELDS, is_of_axis
+from mapfilter.tracks.readers.plain.misspelt import meant
 
 QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "time": (
