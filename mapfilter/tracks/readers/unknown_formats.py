@@ -92,11 +92,13 @@ def _other_separators(path: Path, text: Text, find_format: Callable[[Text], Form
     """Return the hint for a file that would be of a known format with other separators."""
     head = "\n".join(text.head)
     for own, other in itertools.permutations("\t;, ", 2):
+        if own not in head:
+            continue
         if own == " " and any(one in text.first_line for one in _SEPARATORS if one != own):
             # Blanks between words of a table's header separate nothing.
             continue
         found = find_format(Text(path, head.replace(own, other).encode()))
-        if own in head and found is not None:
+        if found is not None:
             return f"{found.title} with {_SEPARATORS[own]} where {_SEPARATORS[other]} should be"
     return ""
 

@@ -7,7 +7,8 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import TypeAlias
 
 from mapfilter._header_units import UNITS, parted_unit, quantity_of
-from mapfilter.tracks.readers.plain.fields import FIELDS, is_of_axis, meant, usual_fields
+from mapfilter.tracks.readers.plain.fields import FIELDS, is_of_axis, usual_fields
+from mapfilter.tracks.readers.plain.misspelt import meant
 from mapfilter.tracks.readers.plain.served_names import served_name
 
 QUANTITIES: Mapping[str, tuple[str, ...]] = {
