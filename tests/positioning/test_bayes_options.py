@@ -187,7 +187,10 @@ def test_only_vehicles_among_cells_may_have_speeds_with_another_scale_after_a_st
     # A smaller error that is stated leaves smaller ones.
     stated = BayesFilter(vehicle=True, scale=0.005).over_area(make_area()).model.motion
     assert stated.rescaled_sd == pytest.approx(0.015)
-    for options, area in ((BayesFilter(), make_area()), (BayesFilter(vehicle=True), without_cells())):
+    for options, area in (
+        (BayesFilter(), make_area()),
+        (BayesFilter(vehicle=True), without_cells()),
+    ):
         assert options.over_area(area).model.motion.rescales_per_m == 0.0
 
 
