@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from mapfilter.errors import MapfilterError
+from mapfilter.tracks.log_folders import HEAD
 from mapfilter.tracks.readers.texts.zipped import files_in_zip, is_zip
 from mapfilter.tracks.schema import TABLES
-from mapfilter.tracks.log_folders import HEAD
 
 UNPACK = "a ZIP of a track log; unpack it, and name its folder"
 
