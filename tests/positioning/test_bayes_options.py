@@ -10,6 +10,8 @@ from made_town import Town
 from small_area import FLOOR_DBM, LATTICE, make_area
 
 from mapfilter.errors import ConfigError
+from mapfilter.filters.contract import MotionStep
+from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes import options as tested
 from mapfilter.positioning.bayes import over_survey as surveys
 from mapfilter.positioning.bayes.area import opened_area
@@ -192,6 +194,33 @@ def test_only_vehicles_among_cells_may_have_speeds_with_another_scale_after_a_st
         (BayesFilter(vehicle=True), without_cells()),
     ):
         assert options.over_area(area).model.motion.rescales_per_m == 0.0
+
+
+def test_vehicles_are_taken_to_drive_before_their_speed_is_measured():
+    driven = BayesFilter(vehicle=True).over_area(make_area()).begin(("radio",)).watch
+    walked = BayesFilter().over_area(make_area()).begin(("radio",)).watch
+    assert (driven.pace.speed_mps, walked.pace.speed_mps) == (7.0, 1.4)
+    assert driven.pace.rows == 0
+    assert driven.has_motion is walked.has_motion
+
+
+@pytest.mark.parametrize(
+    ("options", "nats_per_m"),
+    [
+        (BayesFilter(), 0.04),
+        # Else the null hypothesis would gain by each metre that nothing measured.
+        (BayesFilter(vehicle=True), 0.04),
+        (BayesFilter(off_cost_per_m=0.02), 0.02),
+    ],
+)
+def test_a_way_that_nothing_measured_costs_no_more_than_under_the_null_hypothesis(
+    options, nats_per_m
+):
+    model = options.over_area(make_area()).model
+    state, before = np.zeros((STATES, 20), dtype=np.float32), np.full(20, -3.0)
+    unmeasured = MotionStep(10.0, np.nan, np.nan, 8.0)
+    _, after = model.move(state, before, unmeasured, np.uint64(5))
+    np.testing.assert_allclose(before - after, 10.0 * nats_per_m)
 
 
 def test_a_grid_is_on_the_device_that_is_asked_for():

@@ -54,6 +54,7 @@ from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.source import FirstFix, FixSource, GnssSource, gnss_of
 from mapfilter.positioning.known_start import check_start
+from mapfilter.positioning.sensors.pace import DRIVEN, Pace
 from mapfilter.positioning.sensors.undirected import UndirectedWay
 from mapfilter.positioning.sensors.watch import SensorWatch
 from mapfilter.positioning.step_output import StepOutput, UnusedReading
@@ -161,7 +162,10 @@ class BayesPositioner(Filter[BayesState]):
         """
         check_kinds_given(kinds)
         sources = {source.name: source.begin() for source in self.sources}
-        watch = SensorWatch(has_motion="motion" in kinds or _POSITIONS.isdisjoint(kinds))
+        # One that keeps to ways drives, also where nothing measures how fast.
+        pace = DRIVEN if self.model.motion.corners_per_m > 0 else Pace()
+        has_motion = "motion" in kinds or _POSITIONS.isdisjoint(kinds)
+        watch = SensorWatch(pace=pace, has_motion=has_motion)
         return BayesState(sources=sources, area=self.area.checksum, watch=watch)
 
     def begin_at(

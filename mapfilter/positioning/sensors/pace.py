@@ -35,6 +35,7 @@ _LEARNT_SHARE = 0.5
 _FASTEST_MPS = 9.0
 """Speed of one row that is no walker's in feet either."""
 _WALK_MPS = 1.4
+_DRIVE_MPS = 7.0
 """Speed that is assumed before one is measured."""
 
 
@@ -195,3 +196,7 @@ class Pace(EqualByValue):
         """Return the speed of an epoch's rows; soon after others, over the usual interval."""
         lasted_s = max(since_s, self.interval_s, covered_s)
         return gone_m / lasted_s if self.rows > 1 and lasted_s > 0 else 0.0
+
+
+DRIVEN = Pace(speed_mps=_DRIVE_MPS, recent_mps=_DRIVE_MPS)
+"""The pace of a vehicle of which no motion was reported yet."""

@@ -38,6 +38,7 @@ from mapfilter.positioning.bayes.beliefs.first_hypotheses import (
     Start,
     first_hypotheses,
 )
+from mapfilter.positioning.bayes.rivals.alternative import MAP_NATS_PER_M
 from mapfilter.positioning.bayes.sources.evidence import RadioReading
 from mapfilter.positioning.bayes.sources.evidence_model import EvidenceModel
 
@@ -127,7 +128,7 @@ class BayesModel(EvidenceModel):
         """Move by a step that nothing measured, or whose direction nothing did.
 
         It is no evidence for any place, nor against what the belief leaves out: each metre costs
-        what one off the map does.
+        what one off the map does, but no more than it costs the null hypothesis.
         """
         length_m, size_m = abs(motion.step_m), self.area.size_m
         beyond = (density_beyond(size_m, BEYOND_AT_START, BEYOND_M), BEYOND_M)
@@ -146,7 +147,8 @@ class BayesModel(EvidenceModel):
                 log_weight.size, dtype=np.float32
             )
             moved[BIAS] = wrap_rad(moved[BIAS] + np.float32(motion.turned_sd_rad) * turned)
-        return moved, log_weight - self.weights.off_cost_per_m * length_m
+        cost_per_m = min(self.weights.off_cost_per_m, MAP_NATS_PER_M)
+        return moved, log_weight - cost_per_m * length_m
 
     @property
     def _beyond_per_m(self) -> float:
