@@ -29,7 +29,7 @@ from mapfilter.workflows.lessons import study as learn_study
 
 pytestmark = pytest.mark.usefixtures("small_pictures")
 JOURNEYS, FEW_JOURNEYS = 5, 3
-FEW = ["filter.bayes.max_particles=3000", "filter.bayes.min_search_particles=3000"]
+FEW = [f"filter.bayes.{n}_particles=1500" for n in ("max", "min_search", "min")]
 
 
 def configured(database, logs, *more):
