@@ -9,6 +9,7 @@ from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
 from mapfilter.positioning.bayes.rivals.mirrored import MirrorRules
 from mapfilter.positioning.fingerprints.options import (
     CANDIDATES,
+    LEVEL_ERROR_DB,
     Centroid,
     Neighbours,
     Probabilistic,
@@ -80,6 +81,7 @@ def test_the_usual_options_of_methods_for_single_reports():
     assert asdict(Neighbours()) == neighbours
     assert asdict(Probabilistic()) == {"level_db": 5.0, **levels}
     assert asdict(SurveyMaps()) == {"level_db": 4.0, **levels}
+    assert LEVEL_ERROR_DB == 6.0
     # The best of these is taken where none is named.
     assert [asdict(one) for one in CANDIDATES] == [
         neighbours, neighbours | {"representation": "positive"}, {"level_db": 5.0, **levels},
