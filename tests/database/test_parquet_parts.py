@@ -219,3 +219,27 @@ def test_windows_return_text_as_arrow_and_numbers_as_numpy(tmp_path):
     np.testing.assert_array_equal(found["row"], [*ROW, *ROW])
     # What a window has in its groups but not within it is empty, not missing.
     assert reader.read((0, 3, 1, 1))["row"].size == 0
+
+
+def test_no_byte_of_a_written_page_changes_unnoticed():
+    """A part that is damaged on disk is refused or read as it was; its pages have checksums."""
+    values = np.random.default_rng(3).random(24).astype(np.float32)
+    given = pa.table({"level_dbm": values, "row": np.arange(24, dtype=np.int32)})
+    sink = pa.BufferOutputStream()
+    write_columns(given, sink)
+    whole = sink.getvalue().to_pybytes()
+    group = pq.read_metadata(pa.BufferReader(whole)).row_group(0)
+    refused = 0
+    for column in (group.column(0), group.column(1)):
+        for at in range(column.data_page_offset, column.data_page_offset + 80):
+            damaged = bytearray(whole)
+            damaged[at] ^= 0x10
+            try:
+                read = pq.read_table(
+                    pa.BufferReader(bytes(damaged)), page_checksum_verification=True
+                )
+            except (OSError, pa.ArrowException, ValueError, MemoryError):
+                refused += 1
+                continue
+            assert read.equals(given)
+    assert refused > 80

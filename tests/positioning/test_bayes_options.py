@@ -15,6 +15,7 @@ from mapfilter.models.street_motion import STATES
 from mapfilter.positioning.bayes import options as tested
 from mapfilter.positioning.bayes import over_survey as surveys
 from mapfilter.positioning.bayes.area import opened_area
+from mapfilter.positioning.bayes.assembly import assembled
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.radio.cells import CellPlan
@@ -55,9 +56,12 @@ def test_what_options_make_is_a_filter_over_the_area():
 
 
 def test_only_errors_of_fixes_of_vehicles_last_for_some_time():
-    walker, vehicle = (BayesFilter(vehicle=one).over_area(make_area()) for one in (False, True))
+    area = make_area()
+    walker, vehicle = (assembled(BayesFilter(vehicle=one), area) for one in (False, True))
     assert walker.satellites.fix_memory_s == 0.0
     assert vehicle.satellites == replace(walker.satellites, fix_memory_s=14.0)
+    for one, made in ((False, walker), (True, vehicle)):
+        assert BayesFilter(vehicle=one).over_area(area).satellites == made.satellites
 
 
 def test_the_usual_motion_of_vehicles():

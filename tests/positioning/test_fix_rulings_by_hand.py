@@ -207,3 +207,10 @@ def test_a_burst_lasts_a_quarter_of_a_minute_at_most(lasted_s, is_over):
     assert not record.at_time(lasted_s + 60.0).is_over
     assert record.at_time(lasted_s + 60.1).is_over is is_over
     assert record.at_time(lasted_s + 60.1).is_lost is not is_over
+
+
+def test_the_least_speed_of_fixes_that_go_on_is_one_of_them():
+    """1.5 m/s east, by numbers that have no rounding errors."""
+    times_s = 2.5 * np.arange(5)
+    places = np.column_stack([50.0 + 1.5 * times_s, np.zeros(5)])
+    assert after(times_s, places, 16.0, rests=True)[1].ruling is Ruling.CARRIED

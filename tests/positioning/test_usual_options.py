@@ -7,8 +7,12 @@ import pytest
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeRules
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
 from mapfilter.positioning.bayes.rivals.mirrored import MirrorRules
+from mapfilter.positioning.bayes.state import FIRST_SPACING_M
+from mapfilter.positioning.epochs import FIX_SD_M
+from mapfilter.positioning.fingerprints.cross_validation import MOST_FOLDS, MOST_VALIDATED
 from mapfilter.positioning.fingerprints.options import (
     CANDIDATES,
+    LEVEL_ERROR_DB,
     Centroid,
     Neighbours,
     Probabilistic,
@@ -16,7 +20,10 @@ from mapfilter.positioning.fingerprints.options import (
     method_name,
     method_options,
 )
+from mapfilter.positioning.fingerprints.planned import PATTERN_SHARE, TIMING_CLIP_SD, TIMING_SD_M
+from mapfilter.positioning.fingerprints.sources import MOST_POINTS, STRONGEST
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
+from mapfilter.positioning.integrity import DEFAULT_RISK
 
 
 def test_the_usual_options_of_satellites_and_timing():
@@ -80,6 +87,7 @@ def test_the_usual_options_of_methods_for_single_reports():
     assert asdict(Neighbours()) == neighbours
     assert asdict(Probabilistic()) == {"level_db": 5.0, **levels}
     assert asdict(SurveyMaps()) == {"level_db": 4.0, **levels}
+    assert LEVEL_ERROR_DB == 6.0
     # The best of these is taken where none is named.
     assert [asdict(one) for one in CANDIDATES] == [
         neighbours, neighbours | {"representation": "positive"}, {"level_db": 5.0, **levels},
@@ -94,3 +102,12 @@ def test_the_usual_options_of_methods_for_single_reports():
 def test_a_method_has_a_name_and_its_usual_options(name, method):
     assert method_options(name) == method
     assert method_name(method) == name
+
+
+def test_numbers_that_no_option_sets():
+    assert FIX_SD_M == 10.0
+    assert DEFAULT_RISK == 1e-3
+    assert FIRST_SPACING_M == 5.0
+    assert (MOST_FOLDS, MOST_VALIDATED) == (10, 2000)
+    assert (MOST_POINTS, STRONGEST) == (20_000, 7)
+    assert (TIMING_SD_M, TIMING_CLIP_SD, PATTERN_SHARE) == (200.0, 3.0, 0.4)
