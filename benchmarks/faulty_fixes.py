@@ -6,7 +6,7 @@ Even seeds are for choices, odd ones for figures: ``--seeds 1:25:2``.
 from __future__ import annotations
 
 import argparse
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from faulty_fixes_world import CRS, EAST_M, FAULTS, KINDS, NORTH_M, Journey, journey
@@ -19,6 +19,7 @@ from mapfilter.radio.cells import CellPlan
 
 _AFTER_S, _WRONG_M = 120.0, 50.0
 _CLAIMED = ("TRACKING", "CONVERGED")
+Name = Literal["ekf", "iekf", "rbukf", "ukf", "ckf"]
 
 
 class Score(NamedTuple):
@@ -37,7 +38,7 @@ class Score(NamedTuple):
     radius_m: float
 
 
-def scored(made: Journey, method: str) -> tuple[Score, Score, Score]:
+def scored(made: Journey, method: Name) -> tuple[Score, ...]:
     """Return the scores before, in and after the fault."""
     options, _ = fitted_to_log(KalmanFilter(method=method), made.log)
     tracker = options.over_sites(CellPlan(CRS, ()))
@@ -83,7 +84,7 @@ def main() -> None:
     seeds = range(*map(int, options.seeds.split(":")))
     cases = [name for name in FAULTS if any(one in name for one in options.cases.split(","))]
     print("kind  case  stretch | claimed wrong held held_all error e95 radius | least held_all")
-    for method in options.methods.split(","):
+    for method in (name for name in get_args(Name) if name in options.methods.split(",")):
         for kind in options.kinds.split(","):
             for name in cases:
                 scores = np.array([scored(journey(kind, name, seed), method) for seed in seeds])

@@ -196,7 +196,9 @@ def _steps(gone_m: Floats, heading: Floats, rng: np.random.Generator) -> pd.Data
     )
 
 
-def _fixes(true_m: np.ndarray, fault: Fault, from_s: float, rng: np.random.Generator) -> Floats:
+def _fixes(
+    true_m: np.ndarray, fault: Fault, from_s: float, rng: np.random.Generator
+) -> pd.DataFrame:
     """Return fixes each second that state what they usually are off by."""
     count = len(true_m)
     time_s = np.arange(float(count))
@@ -223,7 +225,7 @@ def _both(rng: np.random.Generator, count: int, width: float) -> np.ndarray:
     return _smooth(rng, count, width) + 1j * _smooth(rng, count, width)
 
 
-def _smooth(rng: np.random.Generator, count: int, width: float) -> Floats:
+def _smooth(rng: np.random.Generator, count: int, width: float) -> pd.DataFrame:
     """Return noise of variance 1 that is smoothed over some samples."""
     wide = int(4 * width)
     found = gaussian_filter1d(rng.normal(size=count + 2 * wide), width)[wide : wide + count]

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from mapfilter.angles import wrap_rad
-from mapfilter.filters.contract import MotionStep, Status
+from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.gaussian import Gaussian
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.kalman.coast import Coast
 from mapfilter.positioning.kalman.coasting import Coasting, Separation
-from mapfilter.positioning.kalman.filter import KalmanFilter
+from mapfilter.positioning.kalman.filter import KalmanFilter, KalmanSmoother
 from mapfilter.positioning.kalman.understated import Understated
 from mapfilter.radio.cells import CellPlan
 
@@ -51,9 +51,13 @@ def followed(steps, fixes, method="ekf"):
         given = None if isnan(fix.real) else GnssFix(EAST + fix.real, NORTH + fix.imag, 9.0, 9.0, 0)
         state, out = tracker.step(state, Epoch(float(k), (step,), gnss=given), rng)
         place = complex(out.fix.east_m - EAST, out.fix.north_m - NORTH)
-        found.append((place, out.fix.radii_m[2], out.fix.status in CLAIMED, state.fixes.coasting))
-    places, radii_m, claimed, states = zip(*found, strict=True)
-    return np.array(places), np.array(radii_m), np.array(claimed), states
+        claimed = out.fix.status in CLAIMED
+        # Fixes that are used while nothing is claimed because of them say why.
+        doubted = out.fix.reason is Reason.ON_PROBATION
+        assert not (doubted and claimed)
+        found.append((place, out.fix.radii_m[2], claimed, state.fixes.coasting, doubted))
+    places, radii_m, claimed, states, doubted = zip(*found, strict=True)
+    return np.array(places), np.array(radii_m), np.array(claimed), states, np.array(doubted)
 
 
 @pytest.mark.parametrize("method", ["ekf", "ukf"])
@@ -65,17 +69,38 @@ def test_fixes_that_are_led_away_are_held_back_until_they_return(mps, method):
     led = slice(200, 200 + lasts_s)
     fixes = way + usual(rng, len(way))
     fixes[led] += mps * np.arange(lasts_s) * np.exp(1.1j)
-    places, radii_m, claimed, states = followed(steps, fixes, method)
+    places, radii_m, claimed, states, doubted = followed(steps, fixes, method)
     off_m = np.abs(places - way)
     assert claimed[:200].all()
     assert (claimed & (off_m > 50))[led].mean() < 0.1
     assert (off_m <= radii_m)[led][-lasts_s // 2 :].mean() > 0.9
     assert not claimed[200 + lasts_s // 2 : 200 + lasts_s].any()
+    assert doubted[led].any()
+    assert not doubted[:200].any()
     # They agree again with where steps have led since before.
     back = slice(200 + lasts_s + 10, None)
     assert claimed[back].all()
     assert off_m[back].max() < 15.0
     assert not states[-1].is_held
+
+
+def test_smoothed_positions_have_not_followed_fixes_that_were_led_away():
+    """The belief that takes over has no past with them."""
+    steps, way, rng = walk(1, 500)
+    fixes = way + usual(rng, len(way))
+    fixes[200:440] += np.arange(240) * np.exp(1.1j)
+    tracker = KalmanFilter().over_sites(CellPlan("EPSG:32629", ()))
+    state, history = tracker.begin({"gnss", "motion"}), KalmanSmoother()
+    for k, (step, fix) in enumerate(zip(steps, fixes, strict=True)):
+        given = GnssFix(EAST + fix.real, NORTH + fix.imag, 9.0, 9.0, 0)
+        before = state
+        state, _ = tracker.step(state, Epoch(float(k), (step,), gnss=given), rng)
+        history.add(before, state)
+    later = np.array([one.mean[:2] for one in history.history.smoothed()]) - [EAST, NORTH]
+    off_m = np.abs(later @ [1, 1j] - way)
+    assert np.isfinite(off_m).all()
+    assert off_m[:200].max() < 15.0
+    assert off_m[450:].max() < 15.0
 
 
 def test_fixes_that_come_back_beside_the_place_are_taken_for_both():
@@ -84,7 +109,7 @@ def test_fixes_that_come_back_beside_the_place_are_taken_for_both():
     fixes = way + usual(rng, len(way))
     fixes[200:260] = nan
     fixes[260:320] += 40.0 * np.exp(2j)
-    places, radii_m, _, _ = followed(steps, fixes)
+    places, radii_m, *_ = followed(steps, fixes)
     off_m = np.abs(places - way)
     assert (off_m <= radii_m)[261:320].mean() > 0.9
     assert off_m[330:].max() < 15.0
@@ -95,7 +120,7 @@ def test_right_fixes_after_a_gap_are_soon_believed():
     steps, way, rng = walk(4, 420)
     fixes = way + usual(rng, len(way))
     fixes[200:260] = nan
-    places, radii_m, claimed, _ = followed(steps, fixes)
+    places, radii_m, claimed, *_ = followed(steps, fixes)
     assert claimed.all()
     assert np.abs(places - way)[262:].max() < 15.0
     assert np.median(radii_m[262:]) < 10.0
@@ -108,7 +133,7 @@ def test_errors_between_houses_are_larger_than_stated():
         steps, way, rng = walk(seed, 600)
         fixes = way + usual(rng, len(way))
         fixes[200:] += slow(rng, 400, 20.0, 60)
-        places, radii_m, _, states = followed(steps, fixes)
+        places, radii_m, _, states, _ = followed(steps, fixes)
         held.append((np.abs(places - way) <= radii_m)[300:].mean())
         before.append(max(one.times for one in states[:200]))
         assert max(one.times for one in states[300:]) > 8.0
@@ -119,7 +144,7 @@ def test_errors_between_houses_are_larger_than_stated():
 def test_good_fixes_are_as_precise_as_they_were():
     for seed in (8, 9):
         steps, way, rng = walk(seed, 500)
-        _, radii_m, claimed, states = followed(steps, way + usual(rng, 500))
+        _, radii_m, claimed, states, _ = followed(steps, way + usual(rng, 500))
         assert claimed.all()
         assert not any(one.is_held for one in states)
         assert np.mean([one.times > 1 for one in states]) < 0.1

@@ -45,6 +45,11 @@ class Coast(NamedTuple):
         mean, covariance = belief.mean, belief.covariance
         return cls(time_s, mean, covariance, covariance[:2, :2], times, mean[:2], fix_m)
 
+    @property
+    def heading_rad2(self) -> float:
+        """Variance of the heading error."""
+        return float(self.covariance[_TURNED, _TURNED])
+
     def moved(self, motion: Motion, about: Floats) -> Coast:
         """Return it after motion that is linear about another mean.
 

@@ -41,6 +41,9 @@ _WALKED_S, _DRIVEN_S, _LOOKED_S = 30.0, 300.0, 180.0
 """Time for which fixes and steps have to agree on the way until both are right again: beside a
 vehicle's way one that is led away by a walker's speed is hardly drawn out. Age of a belief without
 fixes up to which such a way is mostly that of before."""
+_BENT_RAD2, _UNKNOWN_RAD2 = 0.15**2, 0.5**2
+"""Variance of the heading error from which on a belief is bent, and no normal one: it is not
+compared then; from the other on one that was held shows nothing."""
 _GAP_S, _LONGER = 20.0, 3.0
 """Time without a fix that is a gap, and how much longer than that between the last two it is."""
 _WRONG_M2, _MOST_NATS = 60.0**2 * np.eye(2), 50.0
@@ -149,12 +152,16 @@ class Coasting(EqualByValue):
         usual_s = since_s if since_s > 0 else self.usual_s
         after = replace(self, kept=kept, returned_s=returned_s, usual_s=usual_s)
         held = self.apart.coast if self.is_held else None
-        if held is not None and time_s - held.begun_s > _KEPT_S:
-            return after.broken_off()
+        if held is not None:
+            is_over = time_s - held.begun_s > _KEPT_S or held.heading_rad2 > _UNKNOWN_RAD2
+            if is_over:
+                return after.broken_off()
         most = Separation()
         for one in (held,) if held is not None else kept:
             is_return = one.begun_s == returned_s
             if time_s - one.begun_s < _YOUNGEST_S and not is_return:
+                continue
+            if not (is_return or one is held) and one.heading_rad2 > _BENT_RAD2:
                 continue
             prior = after._prior(one, time_s)
             found = Separation(_probability(one, place_m, stated_m2, prior), one)

@@ -17,7 +17,6 @@ from mapfilter.models.state import MOVING, StateLayout
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.gnss.wander import FixWander
 from mapfilter.positioning.kalman.belief import SumBelief
-from mapfilter.positioning.kalman.coasting import Coasting
 from mapfilter.positioning.kalman.disputed import (
     ComparedFix,
     FixRecord,
@@ -32,6 +31,7 @@ from mapfilter.positioning.kalman.models import KalmanOptions, compiled
 from mapfilter.positioning.kalman.proof import Doubt
 from mapfilter.positioning.kalman.readings import fix_covariance_m2
 from mapfilter.positioning.kalman.reckoning import RATE, after_each_other, at_rest
+from mapfilter.positioning.kalman.redirected import regained_by
 
 _RECKONED, _MOVING = Patience(30.0, 120.0), Patience(5.0, 5.0)
 """With dead reckoning, and where but a velocity is known."""
@@ -180,7 +180,9 @@ class FixWeighing:
                     coasting = coasting.broken_off()
                 elif coasting.is_back and len(record.rows) != 1:
                     if coasting.is_known(place_m, stated, moments.mean[where]):
-                        onto = self._regained(coasting, lasting_m)
+                        onto = regained_by(
+                            coasting, self.layout, lasting_m if self._lasts else None
+                        )
                         belief, motion = belief.predict(*onto), after_each_other(motion, onto)
                         record, found = FixRecord(), FixVerdict(Ruling.AGREES, nan)
                         errors = errors._replace(wander=FixWander(), doubt=Doubt.NONE)
@@ -244,21 +246,6 @@ class FixWeighing:
         """Return a belief without what is behind position and errors of dead reckoning."""
         moments, size = belief.moments, self.own.size
         return Gaussian(moments.mean[:size], moments.covariance[:size, :size])
-
-    def _regained(self, coasting: Coasting, lasting_m: float) -> Motion:
-        """Return the motion to a belief without the last fixes, whose errors are unknown again."""
-        coast, size = coasting.apart.coast, self.own.size
-        if coast is None:
-            raise AssertionError("regains with a belief")
-        transition, noise, shift = at_rest(self.layout)
-        both = list(range(size)) + (self._places[1] if self._lasts else [])
-        of = np.eye(size)[[*range(size), *self._places[0][: len(both) - size]]]
-        transition[both] = 0.0
-        shift[both] = of @ coast.mean
-        noise[np.ix_(both, both)] = of @ coast.covariance @ of.T
-        if self._lasts:
-            noise[self._places[1], self._places[1]] += lasting_m**2
-        return transition, noise, shift
 
     def _freer(
         self, moments: Gaussian, off_m: Floats, noise_m2: Floats, elapsed_s: float

@@ -1,4 +1,7 @@
-"""Motions of a belief whose headings turn out to be other ones: jumped, in doubt, or found."""
+"""Motions of a belief that turns out to be another one.
+
+Headings have jumped, are in doubt, or are found, or a belief without fixes takes over.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ import numpy as np
 
 from mapfilter.models.state import StateLayout
 from mapfilter.positioning.kalman.alignment import Direction
+from mapfilter.positioning.kalman.coasting import Coasting
 from mapfilter.positioning.kalman.lasting import Motion
 from mapfilter.positioning.kalman.reckoning import RATE, RECKONED, TURNED, at_rest
 from mapfilter.positioning.kalman.turned import Turn
@@ -66,4 +70,32 @@ def turned_to(direction: Direction, layout: StateLayout) -> Motion:
     transition, noise, shift = at_rest(layout)
     transition[TURNED, TURNED], shift[TURNED] = 0.0, direction.turned_rad
     noise[TURNED, TURNED] = direction.sd_rad**2
+    return transition, noise, shift
+
+
+def regained_by(coasting: Coasting, layout: StateLayout, lasting_m: float | None) -> Motion:
+    """Return the motion to a belief without the last fixes, whose errors are unknown again.
+
+    Parameters
+    ----------
+    coasting : Coasting
+        With such a belief.
+    layout : StateLayout
+        Of the belief that has used them.
+    lasting_m : float or None
+        Deviation of the error of fixes that lasts; None where it is no part of the state.
+    """
+    coast, size = coasting.apart.coast, RECKONED.size
+    if coast is None:
+        raise AssertionError("regained by a belief")
+    transition, noise, shift = at_rest(layout)
+    of = [] if lasting_m is None else [size, size + 1]
+    both = [*range(size), *of]
+    # The place that fixes are of is the position and what lasts.
+    parts = np.eye(size)[[*range(size), *([layout.east, layout.north] if of else [])]]
+    transition[both] = 0.0
+    shift[both] = parts @ coast.mean
+    noise[np.ix_(both, both)] = parts @ coast.covariance @ parts.T
+    if lasting_m is not None:
+        noise[of, of] += lasting_m**2
     return transition, noise, shift

@@ -291,10 +291,10 @@ class KalmanStep:
         count, apart = self.belief.weights.size, self.fixes.coasting.apart
         if apart.coast is not None:
             here_m = self.belief.moments.mean[self.where]
-            if self.status in (Status.CONVERGED, Status.TRACKING) and apart.leaves_too_little(
-                here_m
-            ):
-                self.status = Status.UNCERTAIN
+            if apart.leaves_too_little(here_m):
+                claims = self.status in (Status.CONVERGED, Status.TRACKING)
+                self.status = Status.UNCERTAIN if claims else self.status
+                reason = Reason.ON_PROBATION if reason is Reason.USED else reason
             place |= spread_of(belief_tail(self.belief, self.where, apart))
         elif count > 1:
             lead = self.belief.leading.covariance[np.ix_(self.where, self.where)]
