@@ -45,6 +45,7 @@ _SEVERAL = {
 """Names that several zones have, or had, and a zone or some that may be meant."""
 _BEHIND = r"^(?P<time>.*\d)\s*\b(?P<name>[A-Z]{3,4}|[A-Z]{5})$"
 _NAME = re.compile(r"\d\s*\b([A-Z]{3,5})$", re.ASCII)
+_PLACE = re.compile(r"\d\s+([A-Z][a-z]{2,20}/[A-Z]\w{1,20})$", re.ASCII)
 _KNOWN = ("UTC", "GMT")
 _YEAR = 2026
 
@@ -86,6 +87,8 @@ def named_zone_hint(text: str) -> str:
     >>> named_zone_hint("2026-05-13 10:00:00 EST")
     'EST is of several zones; --zone America/New_York, or write the offset (10:00:00-05:00)'
     """
+    if place := _PLACE.search(text.strip()):
+        return f"leave {place[1]} out behind the times, and give --zone {place[1]}"
     found = _NAME.search(text.strip())
     if found is None or found[1] in (*_KNOWN, *_OFFSETS):
         return ""
