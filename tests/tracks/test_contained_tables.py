@@ -324,3 +324,19 @@ def test_parquet_of_mapfilter_itself_is_no_recording(tmp_path):
         with pytest.raises(InputError, match="name the folder that it lies in"):
             read_recording(path)
         (tmp_path / head).unlink()
+
+
+def test_cells_in_the_extensions_of_gpx(tmp_path):
+    """They were left out without a word."""
+    points = "".join(
+        f'<trkpt lat="{LAT_DEG[at]}" lon="24.94"><ele>10</ele><time>{ISO[at]}</time><extensions>'
+        f"<net:mcc>244</net:mcc><net:mnc>91</net:mnc><net:tac>3021</net:tac><net:ci>123</net:ci>"
+        f"<net:rsrp>-8{at}</net:rsrp></extensions></trkpt>"
+        for at in ROWS
+    )
+    text = f'<gpx version="1.1" creator="own"><trk><trkseg>{points}</trkseg></trk></gpx>'
+    found = read(tmp_path, "walk.gpx", text)
+    positions = assert_placed(found, ["GPX with cells read as a table of 5 rows"])
+    assert positions["altitude_m"].tolist() == [10.0] * 5
+    assert found.tables["radio"]["cell"].unique().tolist() == ["244-91-3021-123"]
+    assert found.tables["radio"]["level_dbm"].tolist() == [-80, -81, -82, -83, -84]
