@@ -9,6 +9,7 @@ from mapfilter._inputs import open_input
 from mapfilter.tracks.readers.contained.android_cells import android_table, has_android_cells
 from mapfilter.tracks.readers.contained.json_tables import is_json, json_table
 from mapfilter.tracks.readers.contained.modem_lines import is_modem_log, modem_table
+from mapfilter.tracks.readers.contained.wkt_points import with_point_columns
 from mapfilter.tracks.readers.contained.xml_tables import (
     gpx_table,
     has_cells,
@@ -100,7 +101,7 @@ def _table_in(text: Text, is_known: Callable[[Text], bool], own: Collection[str]
         return tcx_table(text)
     if not is_known(text) and is_modem_log(text):
         return modem_table(text)
-    return text
+    return with_point_columns(text)
 
 
 def _is_of_a_journey(table: Text, own: Collection[str]) -> bool:

@@ -115,7 +115,7 @@ def gpx_table(text: Text) -> Text | None:
         for piece in content.split(f"<{tag} ")[1:]:
             attributes, _, rest = piece.partition(">")
             inner, closed, _ = rest.partition(f"</{tag}>")
-            found = {(name,): value for name, value in _LEAF.findall(inner)}
+            found: dict[Path_, str] = {(name,): value for name, value in _LEAF.findall(inner)}
             place = dict(_ATTRIBUTE.findall(attributes))
             if closed and place.keys() >= {"lat", "lon"} and ("time",) in found:
                 records.append({("lat",): place["lat"], ("lon",): place["lon"], **found})

@@ -35,7 +35,7 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
     "time": (
         *("time", "time_s", "timestamp", "datetime", "utc", "unix_time", "date_time", "t"),
         *("timestamps", "timestep_time", "time_utc_usec"),
-        *("ts", "time_stamp", "epoch", "unix_timestamp"),
+        *("ts", "time_stamp", "epoch", "unix_timestamp", "tst", "isotst"),
         *("measured_at", "recorded_at", "tow", "tow_s", "gps_tow", "time_of_week"),
         "yyyy-mo-dd hh-mi-ss_sss",
     ),
