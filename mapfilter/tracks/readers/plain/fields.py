@@ -40,11 +40,12 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
         "yyyy-mo-dd hh-mi-ss_sss",
     ),
     "lat_deg": (
-        *("lat_deg", "lat", "latitude", "location latitude :"),
+        *("lat_deg", "lat", "latitude", "location latitude :", "latitude n/s"),
         *("gps_latitude", "gps_lat", "gnss_latitude", "gnss_lat"),
     ),
     "lon_deg": (
         *("lon_deg", "lon", "lng", "long", "longitude", "longtitude", "location longitude :"),
+        "longitude e/w",
         *("gps_longitude", "gps_lon", "gps_long", "gps_lng", "gnss_longitude", "gnss_lon"),
     ),
     "altitude_m": ("altitude_m", "altitude", "ele", "height_m"),
