@@ -44,6 +44,7 @@ _SEVERAL = {
 }
 """Names that several zones have, or had, and a zone or some that may be meant."""
 _BEHIND = r"^(?P<time>.*\d)\s*\b(?P<name>[A-Z]{3,4}|[A-Z]{5})$"
+_LETTERS = r"[A-Z]{3}$"
 _NAME = re.compile(r"\d\s*\b([A-Z]{3,5})$", re.ASCII)
 _PLACE = re.compile(r"\d\s+([A-Z][a-z]{2,20}/[A-Z]\w{1,20})$", re.ASCII)
 _KNOWN = ("UTC", "GMT")
@@ -70,6 +71,8 @@ def with_offsets(column: pa.ChunkedArray, zone: str) -> tuple[pa.ChunkedArray, l
     >>> with_offsets(pa.chunked_array([["2026-05-13 10:00:00 EST"]]), "")[0].to_pylist()
     ['2026-05-13 10:00:00 EST']
     """
+    if not pc.any(pc.match_substring_regex(column, _LETTERS)).as_py():
+        return column, []
     names = pc.struct_field(pc.extract_regex(column, _BEHIND), "name")
     notes = []
     for name in sorted(set(pc.unique(names).to_pylist()) - {None, *_KNOWN}):

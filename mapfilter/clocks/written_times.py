@@ -126,7 +126,7 @@ def _order(column: pa.ChunkedArray, later: Later | None) -> tuple[str, list[str]
         following = next(more, None) if unclear else None
         if following is None:
             break
-        dates = pa.chunked_array([*dates.chunks, *_dates(following).chunks])
+        dates = pa.chunked_array([*dates.chunks, *_dates(plainly_written(following)).chunks])
     if not order:
         return "", []
     years = "a short year" if short == order else "slashes or hyphens"
@@ -134,8 +134,8 @@ def _order(column: pa.ChunkedArray, later: Later | None) -> tuple[str, list[str]
 
 
 def _dates(column: pa.ChunkedArray) -> pa.ChunkedArray:
-    """Return the different beginnings of texts, as long as a date."""
-    cut = pc.utf8_slice_codeunits(plainly_written(column), 0, _DATE_LETTERS)
+    """Return the different beginnings of plainly written texts, as long as a date."""
+    cut = pc.utf8_slice_codeunits(column, 0, _DATE_LETTERS)
     return pa.chunked_array([pc.unique(cut)], pa.string())
 
 
