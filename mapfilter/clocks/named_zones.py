@@ -44,7 +44,9 @@ _SEVERAL = {
 }
 """Names that several zones have, or had, and a zone or some that may be meant."""
 _BEHIND = r"^(?P<time>.*\d)\s*\b(?P<name>[A-Z]{3,4}|[A-Z]{5})$"
+_LETTERS = r"[A-Z]{3}$"
 _NAME = re.compile(r"\d\s*\b([A-Z]{3,5})$", re.ASCII)
+_PLACE = re.compile(r"\d\s+([A-Z][a-z]{2,20}/[A-Z]\w{1,20})$", re.ASCII)
 _KNOWN = ("UTC", "GMT")
 _YEAR = 2026
 
@@ -69,6 +71,8 @@ def with_offsets(column: pa.ChunkedArray, zone: str) -> tuple[pa.ChunkedArray, l
     >>> with_offsets(pa.chunked_array([["2026-05-13 10:00:00 EST"]]), "")[0].to_pylist()
     ['2026-05-13 10:00:00 EST']
     """
+    if not pc.any(pc.match_substring_regex(column, _LETTERS)).as_py():
+        return column, []
     names = pc.struct_field(pc.extract_regex(column, _BEHIND), "name")
     notes = []
     for name in sorted(set(pc.unique(names).to_pylist()) - {None, *_KNOWN}):
@@ -86,6 +90,8 @@ def named_zone_hint(text: str) -> str:
     >>> named_zone_hint("2026-05-13 10:00:00 EST")
     'EST is of several zones; --zone America/New_York, or write the offset (10:00:00-05:00)'
     """
+    if place := _PLACE.search(text.strip()):
+        return f"leave {place[1]} out behind the times, and give --zone {place[1]}"
     found = _NAME.search(text.strip())
     if found is None or found[1] in (*_KNOWN, *_OFFSETS):
         return ""

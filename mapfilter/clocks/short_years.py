@@ -10,6 +10,8 @@ import pyarrow.compute as pc
 
 _DATE = re.compile(r"^(\d\d?)([/.-])(\d\d?)\2(\d\d)(?!\d)", re.ASCII)
 _SHORT = r"^(\d\d?)([/.-])(\d\d?)([/.-])(\d\d)(\D|$)"
+_NAMED = r"^(\d\d?)[- ]([A-Za-z]{3})[- ](\d\d)(\D|$)"
+"""A month by its name, before which no one writes a short year: 13-MAY-26, as of Oracle."""
 _WRITTEN = {
     "day": (r"20\5-\3-\1\6", (3, 2, 1)),
     "month": (r"20\5-\1-\3\6", (3, 1, 2)),
@@ -43,7 +45,7 @@ def short_order(column: pa.ChunkedArray) -> str:
     texts = pc.unique(pc.utf8_slice_codeunits(pc.utf8_trim_whitespace(column), 0, 9))
     dates = [found for one in texts.to_pylist() if one and (found := _DATE.match(one))]
     if not dates:
-        return ""
+        return "day" if pc.any(pc.match_substring_regex(texts, _NAMED)).as_py() else ""
     dots = any(one[2] == "." for one in dates)
     parts = [(int(one[1]), int(one[3]), int(one[4])) for one in dates]
     short = all(len(one[1]) == 2 for one in dates)
@@ -74,7 +76,8 @@ def with_long_years(column: pa.ChunkedArray, order: str) -> pa.ChunkedArray:
     """
     if order not in _WRITTEN:
         return column
-    return pc.replace_substring_regex(column, _SHORT, _WRITTEN[order][0])
+    named = pc.replace_substring_regex(column, _NAMED, r"\1-\2-20\3\4")
+    return pc.replace_substring_regex(named, _SHORT, _WRITTEN[order][0])
 
 
 def _is_recent(parts: tuple[int, int, int], order: str) -> bool:

@@ -23,7 +23,7 @@ def hint_on_time(text: str) -> str:
         return zone_hint
     if re.match(r"\d{1,2}[-/]\d{1,2}[-/]\d{2,4}", text.strip()):
         return "day or month first? Write 2021-03-04, or 4.3.2021 with dots"
-    if re.match(r"\d{1,2}[-. ][^\W\d_]{3,}\.?[-. ]\d{4}", text.strip()):
+    if re.match(r"\d{1,2}[-. ]{1,2}[^\W\d_]{3,}\.?[-. ]\d{4}", text.strip()):
         return "a month that is not named in English; write 2026-05-01T10:00:00"
     if re.match(r"\d{1,2}:\d\d", text.strip()):
         return "a time of day without its date; write 2026-05-01T08:00:00, or seconds"

@@ -25,9 +25,28 @@ _LAST_MONTH = 12
 _DAY_OF_WEEK = r"^(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun),?\s+"
 _CLOCK = r"\d\d:\d\d:\d\d"
 _DAY = rf"{_DAY_OF_WEEK}(\w{{3}}) +(\d\d?) ({_CLOCK})"
+_IN_PLACE = (
+    # The time of day before the date.
+    (
+        r"^(\d\d?:\d\d(?::\d\d(?:\.\d{1,9})?)?)\s+(\d{1,4}[-/.]\d\d?[-/.]\d{1,4})$",
+        r"\2 \1",
+    ),
+    # A comma before the time of day, as a browser writes it, or a hyphen.
+    (r"^(\d{1,4}[/.-]\d\d?[/.-]\d{1,4})(?:,?\s+|-)(\d)", r"\1 \2"),
+    # A time of day with dots.
+    (r"^(\S+\s)(\d\d?)\.(\d\d)\.(\d\d)(\D|$)", r"\1\2:\3:\4\5"),
+    # A comma for the point of a fraction, which is a blank in quotes.
+    (
+        r"^(\d{1,4}[/.-]\d\d?[/.-]\d{1,4}[ T]\d\d?:\d\d:\d\d)\s(\d{1,9})$",
+        r"\1.\2",
+    ),
+    # An offset behind the name of UTC, of one digit or of two.
+    (r"\s(?:GMT|UTC)([+-])(\d)$", r"\10\2:00"),
+    (r"\s(?:GMT|UTC)([+-]\d\d(?::?\d\d)?)$", r"\1"),
+    (r"^(\d{4}):(\d\d):(\d\d)\s", r"\1-\2-\3 "),
+    (r"^(\d{4})年(\d\d?)月(\d\d?)日\s*", r"\1-\2-\3 "),
+)
 _REWRITTEN = (
-    # A comma before the time of day, as a browser writes it.
-    (r"^(\d{1,4}[/-]\d\d?[/-]\d{1,4}),?\s+", r"\1 "),
     # A zone's name after its offset, as Java writes it.
     (r"(Z|[+-]\d\d:?\d\d)\[[\w/+-]+\]$", r"\1"),
     # A date and a time of day without separators, with one between both.
@@ -126,6 +145,21 @@ def has_year_last(column: pa.ChunkedArray) -> bool:
     return bool(pc.any(pc.match_substring_regex(column, _YEAR_LAST)).as_py())
 
 
+def plainly_written(column: pa.ChunkedArray) -> pa.ChunkedArray:
+    """Return texts of times with the date first, a colon in times of day and offsets alone.
+
+    Examples
+    --------
+    >>> given = ["10:00:05 13/5/2026", "13.05.2026, 10.00.05", "2026-05-13 10:00:05 UTC+2"]
+    >>> plainly_written(pa.chunked_array([given])).to_pylist()
+    ['13/5/2026 10:00:05', '13.05.2026 10:00:05', '2026-05-13 10:00:05+02:00']
+    """
+    found = pc.utf8_trim_whitespace(column)
+    for pattern, by in _IN_PLACE:
+        found = pc.replace_substring_regex(found, pattern, by)
+    return found
+
+
 def with_year_first(column: pa.ChunkedArray, order: str) -> pa.ChunkedArray:
     """Return texts of times whose dates have the order of ISO 8601.
 
@@ -141,7 +175,7 @@ def with_year_first(column: pa.ChunkedArray, order: str) -> pa.ChunkedArray:
     >>> with_year_first(pa.chunked_array([given]), "day").to_pylist()
     ['2026-5-13 10:00', '2026-05-13 10:00:00', '13-May-2026 10:00:00+02:00']
     """
-    found = pc.utf8_trim_whitespace(column)
+    found = plainly_written(column)
     for pattern, by in _REWRITTEN:
         found = pc.replace_substring_regex(found, pattern, by)
     if order not in _YEAR_FIRST:

@@ -12,6 +12,7 @@ import pyarrow.compute as pc
 
 from mapfilter._types import Floats
 from mapfilter.clocks.named_zones import with_offsets
+from mapfilter.clocks.ordinal_dates import with_calendar_days
 from mapfilter.clocks.plain_times import plain_times
 from mapfilter.clocks.short_years import SHORT_YEAR, short_order, with_long_years
 from mapfilter.clocks.times import LEAST_UNIX_S, parse_times, unix_seconds
@@ -19,6 +20,7 @@ from mapfilter.clocks.written_dates import (
     are_compact,
     has_year_last,
     order_of,
+    plainly_written,
     with_year_first,
 )
 
@@ -81,8 +83,8 @@ def written_times(
         return WrittenTimes(numbers, True)
     if (plain := plain_times(column, zone, layout, after_s)) is not None:
         return WrittenTimes(*plain)
-    column = pc.utf8_trim_whitespace(column)
     if layout != "ISO8601":
+        column = pc.utf8_trim_whitespace(column)
         return WrittenTimes(*parse_times(_texts(column), zone, layout, after_s))
     column, order, notes = in_iso_order(column, zone, order, later)
     time_s, zoned = parse_times(_texts(column), zone, layout, after_s)
@@ -106,6 +108,7 @@ def in_iso_order(
     order : str
     notes : tuple of str
     """
+    column = with_calendar_days(plainly_written(column))
     notes: list[str] = []
     if order not in _ORDERS:
         order, notes = _order(column, later)
@@ -123,7 +126,7 @@ def _order(column: pa.ChunkedArray, later: Later | None) -> tuple[str, list[str]
         following = next(more, None) if unclear else None
         if following is None:
             break
-        dates = pa.chunked_array([*dates.chunks, *_dates(following).chunks])
+        dates = pa.chunked_array([*dates.chunks, *_dates(plainly_written(following)).chunks])
     if not order:
         return "", []
     years = "a short year" if short == order else "slashes or hyphens"
@@ -131,8 +134,8 @@ def _order(column: pa.ChunkedArray, later: Later | None) -> tuple[str, list[str]
 
 
 def _dates(column: pa.ChunkedArray) -> pa.ChunkedArray:
-    """Return the different beginnings of texts, as long as a date."""
-    cut = pc.utf8_slice_codeunits(pc.utf8_trim_whitespace(column), 0, _DATE_LETTERS)
+    """Return the different beginnings of plainly written texts, as long as a date."""
+    cut = pc.utf8_slice_codeunits(column, 0, _DATE_LETTERS)
     return pa.chunked_array([pc.unique(cut)], pa.string())
 
 

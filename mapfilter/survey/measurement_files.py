@@ -36,6 +36,16 @@ from mapfilter.survey.measurement_rows import FIELDS, REQUIRED, Rows
 from mapfilter.survey.measurement_times import with_date
 
 _UNAVAILABLE = 1e9
+_USUAL = {
+    "lat": ("latitude", "lat_deg"),
+    "lon": ("longitude", "lon_deg"),
+    "level_dbm": ("rsrp", "rscp", "dbm", "signal", "level"),
+    "lac": ("tac", "lac/tac", "tac/lac"),
+    "ci": ("cell id", "cell_id", "cellid", "cid", "eci", "nci"),
+    "time": ("timestamp", "datetime", "date_time", "measured_at"),
+    "accuracy_m": ("accuracy",),
+}
+"""Usual names of columns of drive tests that have no times, which no recording lacks."""
 _DATE = "date"
 """A column of days beside times of day."""
 _FIRST_LINES = 100
@@ -108,6 +118,8 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
     separator, header = _header(lines)
     if not header:
         raise fail(InputError, str(path), "a header line and rows", "nothing", "no text file")
+    dialect, taken = _with_usual(dialect, header)
+    rows.remarks += [f"columns by their usual names: {', '.join(taken)}"] if taken else []
     places, signs = _places(path, header, dialect), _Signs()
     is_dbm = all(header[at].endswith("dbm") for at in places["level_dbm"])
     stating = [at for at, name in enumerate(header) if name in OF_CARRIERS]
@@ -233,6 +245,24 @@ def _split(text: str, separator: str) -> list[str]:
         return next(csv.reader([text], delimiter=separator), [])
     except csv.Error:
         return []
+
+
+def _with_usual(dialect: Dialect, header: Sequence[str]) -> tuple[Dialect, list[str]]:
+    """Return a dialect with usual names of fields that have no column, and which were taken.
+
+    Columns that a user names, and those of a program's dialect, have no others.
+    """
+    if set(IDENTITY) <= set(dialect.required):
+        return dialect, []
+    found: dict[str, str] = {}
+    used = {column for columns in dialect.columns.values() for column in columns}
+    for name, usual in _USUAL.items():
+        own = dialect.columns.get(name, ())
+        if own[:1] == (name,) and not any(column in header for column in own):
+            column = next((one for one in usual if one in header and one not in used), "")
+            found |= {name: column} if column else {}
+    columns = {**dialect.columns, **{name: (column,) for name, column in found.items()}}
+    return dialect._replace(columns=columns), [f"{one} ({name})" for name, one in found.items()]
 
 
 def _places(path: Path, header: Sequence[str], dialect: Dialect) -> dict[str, tuple[int, ...]]:

@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
+from mapfilter.errors import InputError
 from mapfilter.survey import measurement_times
 from mapfilter.survey.read_measurements import read_measurements
 
@@ -75,3 +76,18 @@ def test_days_beside_times_of_day(tmp_path):
     names = {"time": "uhrzeit"}
     found = read(tmp_path, "date,uhrzeit", [f"13.05.26,{one}" for one in CLOCKS], columns=names)
     assert found.time_s.tolist() == [START_S, START_S + 1, START_S + 2]
+
+
+def test_a_drive_test_without_times_by_usual_names(tmp_path):
+    """CellMapper's columns were asked for by other names, as lat for Latitude."""
+    head = "Latitude,Longitude,Altitude,MCC,MNC,LAC,Cell ID,Signal,Type,Subtype,ARFCN,PSC or PCI"
+    rows = [f"60.1{at:03d},24.9,10,244,91,3021,12345678,-8{at},LTE,LTE,1300,7" for at in range(5)]
+    path = tmp_path / "cellmapper.csv"
+    path.write_text("\n".join([head, *rows]) + "\n")
+    found = read_measurements([path])
+    assert found.cell_ids == ("244-91-3021-12345678",)
+    assert sorted(found.level_dbm) == [-84, -83, -82, -81, -80]
+    (note,) = found.notes
+    assert "columns by their usual names: latitude (lat), longitude (lon), signal (level" in note
+    with pytest.raises(InputError, match="a column pegel for level_dbm"):
+        read_measurements([path], columns={"level_dbm": "pegel"})

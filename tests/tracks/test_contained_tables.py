@@ -324,3 +324,41 @@ def test_parquet_of_mapfilter_itself_is_no_recording(tmp_path):
         with pytest.raises(InputError, match="name the folder that it lies in"):
             read_recording(path)
         (tmp_path / head).unlink()
+
+
+def test_cells_in_the_extensions_of_gpx(tmp_path):
+    """They were left out without a word."""
+    points = "".join(
+        f'<trkpt lat="{LAT_DEG[at]}" lon="24.94"><ele>10</ele><time>{ISO[at]}</time><extensions>'
+        f"<net:mcc>244</net:mcc><net:mnc>91</net:mnc><net:tac>3021</net:tac><net:ci>123</net:ci>"
+        f"<net:rsrp>-8{at}</net:rsrp></extensions></trkpt>"
+        for at in ROWS
+    )
+    text = f'<gpx version="1.1" creator="own"><trk><trkseg>{points}</trkseg></trk></gpx>'
+    found = read(tmp_path, "walk.gpx", text)
+    positions = assert_placed(found, ["GPX with cells read as a table of 5 rows"])
+    assert positions["altitude_m"].tolist() == [10.0] * 5
+    assert found.tables["radio"]["cell"].unique().tolist() == ["244-91-3021-123"]
+    assert found.tables["radio"]["level_dbm"].tolist() == [-80, -81, -82, -83, -84]
+
+
+@pytest.mark.parametrize("separator", [",", ";"])
+@pytest.mark.parametrize(
+    "point", ["POINT ({} {})", "SRID=4326;POINT({} {})", "Point Z ({} {} 10.5)"]
+)
+def test_points_as_well_known_text(tmp_path, separator, point):
+    """As geopandas writes them by to_csv; a table was without positions."""
+    if separator in point:
+        point = f'"{point}"'
+    rows = [separator.join([ISO[at], point.format(24.94, LAT_DEG[at]), "-80"]) for at in ROWS]
+    content = "\n".join([separator.join(["time", "geometry", "rsrp"]), *rows]) + "\n"
+    found = read(tmp_path, "drive.csv", content)
+    assert_placed(found, ["geometry: points taken for longitude and latitude"])
+    assert found.tables["radio"]["level_dbm"].tolist() == [-80.0] * 5
+
+
+def test_points_in_metres_are_refused(tmp_path):
+    path = tmp_path / "drive.csv"
+    path.write_text(f"time,geometry\n{ISO[0]},POINT (385000 6672000)\n")
+    with pytest.raises(InputError, match="not degrees"):
+        read_recording(path)

@@ -358,3 +358,38 @@ def test_a_table_without_names_is_said_to_be_one(tmp_path):
     path.write_text("1778659200000;60.1686;24.938;-80\n1778659201000;60.1687;24.938;-81\n")
     with pytest.raises(InputError, match="a table without a line of names: write one above it"):
         read_recording(path)
+
+
+def test_modified_julian_dates(tmp_path):
+    """A table of them was without a column of times."""
+    path = tmp_path / "fix.csv"
+    path.write_text("mjd,lat,lon\n61173.333333333,60.17,24.94\n61173.333344907,60.171,24.94\n")
+    found = read_recording(path)
+    assert found.tables["positions"]["time_s"].tolist() == [1_778_659_200.0, 1_778_659_201.0]
+    assert any("taken for UTC" in note for note in found.notes)
+
+
+def test_a_row_of_units_below_the_names(tmp_path, monkeypatch):
+    """It was a row of values that are no numbers, and speeds had no unit."""
+    monkeypatch.setattr(text, "_PART_BYTES", 200)
+    rows = [f"2026-05-13T08:00:{at:02d}Z,60.17{at:02d},24.94,36,1000" for at in range(30)]
+    head = ["time,lat,lon,vehicle speed,pressure", "s,deg,deg,km/h,(hPa)"]
+    path = tmp_path / "drive.csv"
+    path.write_text("\n".join([*head, *rows]) + "\n")
+    found = read_recording(path)
+    assert found.tables["odometry"]["speed_mps"].tolist() == pytest.approx([10.0] * 30)
+    assert len(found.tables["positions"]) == len(found.tables["barometer"]) == 30
+    assert any("units are those of the row below the names" in note for note in found.notes)
+    assert not [note for note in found.notes if "no number" in note]
+    # Words are no units, nor is a row with a number.
+    for other in ("a,b,c,d,e", "s,deg,deg,km/h,1000", "s,,,,"):
+        path.write_text("\n".join([head[0], other, *rows]) + "\n")
+        assert "odometry" not in read_recording(path).tables
+
+
+def test_columns_of_a_logger_with_letters_of_hemispheres(tmp_path):
+    path = tmp_path / "columbus.csv"
+    head = "INDEX,TAG,DATE,TIME,LATITUDE N/S,LONGITUDE E/W,HEIGHT,SPEED,HEADING,VOX"
+    path.write_text(f"{head}\n1,T,260513,080000,60.170000N,024.940000W,12,29,0,\n")
+    (row,) = read_recording(path).tables["positions"].to_dict("records")
+    assert (row["lat_deg"], row["lon_deg"]) == (60.17, -24.94)

@@ -48,6 +48,18 @@ def read(tmp_path, header, times, zone="+00:00"):
         '"May 13, 2026, {} AM"',
         "Wed May 13 {} WET 2026",
         "2026-05-13 {} WET",
+        "{} 13/05/2026",
+        "{} 2026-05-13",
+        '"13.05.2026, {}"',
+        "2026/05/13-{}",
+        "2026:05:13 {}",
+        "2026-133T{}",
+        "2026:133:{}",
+        "2026年5月13日 {}",
+        "13-MAY-26 {}",
+        "13-May-26 {} AM",
+        "2026-05-13 {} UTC+0",
+        "2026-05-13 {} GMT+00:00",
     ],
 )
 def test_dates_that_are_of_one_order_are_read(tmp_path, times):
@@ -154,6 +166,32 @@ def test_parts_of_a_file_have_one_order(tmp_path, monkeypatch):
     log = read(tmp_path, "date,time", unclear)
     assert np.isnan(log.start_utc_s)
     assert np.ptp(log.gnss["time_s"]) < 86_400
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        ["13/05/2026 10.00.58", "13/05/2026 10.00.59"],
+        ["2026:133:36058", "2026:133:36059"],
+        ['"2026-05-13 10:00:58,000"', '"2026-05-13 10:00:59,000"'],
+        ["13-MAY-26 10.00.58.000000 AM", "13-MAY-26 10.00.59.000000 AM"],
+        ["2026-05-13 12:00:58 UTC+2", "2026-05-13 12:00:59 UTC+2"],
+        ["2026-05-13 05:00:58 GMT-5", "2026-05-13 05:00:59 GMT-5"],
+        ["2026-05-13 15:30:58 UTC+05:30", "2026-05-13 15:30:59 UTC+05:30"],
+    ],
+)
+def test_times_of_day_and_offsets_of_other_layouts(tmp_path, times):
+    log = read(tmp_path, "time", times)
+    assert log.start_utc_s == START_S
+    assert log.gnss["time_s"].tolist() == [0.0, 1.0]
+
+
+@pytest.mark.parametrize("day", ["2026-366", "2026-000", "2026-999"])
+def test_days_that_a_year_has_not_are_no_times(tmp_path, day):
+    with pytest.raises(InputError, match="expected seconds, Unix time, or ISO 8601"):
+        read(tmp_path, "time", [f"{day}T10:00:00"])
+    log = read(tmp_path, "time", ["2024-366T23:59:59", "2025-001T00:00:00"])
+    assert log.gnss["time_s"].tolist() == [0.0, 1.0]
 
 
 @pytest.mark.parametrize("clocks", [("10.00.58", "10.00.59"), ("10-00-58", "10-00-59")])

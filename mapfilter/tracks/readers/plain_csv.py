@@ -34,6 +34,7 @@ from mapfilter.tracks.readers.plain.set_back import with_clock_set_right
 from mapfilter.tracks.readers.plain.steps import add_steps, are_counted
 from mapfilter.tracks.readers.plain.technology import with_technologies
 from mapfilter.tracks.readers.plain.times import times_of
+from mapfilter.tracks.readers.plain.unit_rows import with_unit_row
 from mapfilter.tracks.readers.plain.unused import unused_columns, unused_note
 from mapfilter.tracks.readers.plain.value_units import with_value_units
 from mapfilter.tracks.readers.plain.weeks import week_column
@@ -102,6 +103,7 @@ def read_columns(rows: Columns, reading: Reading, options: ReadOptions) -> None:
         A field or column that does not exist, a unit of another quantity in a name, no times.
     """
     named = {name.lower() for name in options.columns.values()}
+    rows = with_unit_row(rows, named)
     rows = with_value_units(with_full_names(rows, named), named)
     mapped = with_bare_degrees(mapped_columns(rows, reading, options))
     mapped = with_dates(with_technologies(mapped, reading))

@@ -8,8 +8,16 @@ from pathlib import Path
 from mapfilter._inputs import open_input
 from mapfilter.tracks.readers.contained.android_cells import android_table, has_android_cells
 from mapfilter.tracks.readers.contained.json_tables import is_json, json_table
-from mapfilter.tracks.readers.contained.kml_tables import is_kml, is_tcx, kml_table, tcx_table
 from mapfilter.tracks.readers.contained.modem_lines import is_modem_log, modem_table
+from mapfilter.tracks.readers.contained.wkt_points import with_point_columns
+from mapfilter.tracks.readers.contained.xml_tables import (
+    gpx_table,
+    has_cells,
+    is_kml,
+    is_tcx,
+    kml_table,
+    tcx_table,
+)
 from mapfilter.tracks.readers.plain.app_names import full_names
 from mapfilter.tracks.readers.plain.fields import usual_fields
 from mapfilter.tracks.readers.plain.headers import stated_fields
@@ -63,11 +71,11 @@ def read_any(
     suffix = path.suffix.lower()
     if suffix in _WORKBOOKS and _begins(path, _BEGINS_OF_WORKBOOKS):
         # Here, as what reads workbooks and layers takes long to import.
-        from mapfilter.tracks.readers.contained.workbooks import sheet_of
+        from mapfilter.tracks.readers.contained.sheets_and_layers import sheet_of
 
         return sheet_of(path)
     if suffix in _LAYERS and _begins(path, _BEGINS_OF_LAYERS):
-        from mapfilter.tracks.readers.contained.workbooks import layer_of
+        from mapfilter.tracks.readers.contained.sheets_and_layers import layer_of
 
         return layer_of(path, _PEEKED_ROWS if most_bytes >= 0 else -1)
     # Of many in a folder, as parts of results, none is a journey unless it is named.
@@ -87,11 +95,13 @@ def _table_in(text: Text, is_known: Callable[[Text], bool], own: Collection[str]
         return android_table(text)
     if is_kml(text):
         return kml_table(text)
+    if has_cells(text):
+        return gpx_table(text) or text
     if is_tcx(text):
         return tcx_table(text)
     if not is_known(text) and is_modem_log(text):
         return modem_table(text)
-    return text
+    return with_point_columns(text)
 
 
 def _is_of_a_journey(table: Text, own: Collection[str]) -> bool:

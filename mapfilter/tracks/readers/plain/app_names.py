@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mapfilter._constants import DAY_S
 from mapfilter.errors import listed
 from mapfilter.tracks.readers.plain.date_parts import of_parts, parts_of_dates
 from mapfilter.tracks.readers.plain.served_names import states_serving, with_served_names
@@ -15,6 +16,8 @@ from mapfilter.tracks.readers.texts.columns import Columns
 _FIT_EPOCH_S = 631_065_600
 """Unix time of 31 December 1989, from which FIT counts seconds."""
 _FIT_TIME = "record.timestamp[s]"
+_MJD, _MJD_EPOCH = "mjd", 40_587
+"""Modified Julian dates, and that of 1970."""
 _SECONDS = "header.stamp.sec"
 _ROS_2 = frozenset((_SECONDS, "header.stamp.nanosec"))
 """The two parts of a time, as converters of bags of ROS 2 write them."""
@@ -82,6 +85,12 @@ _PROGRAMS = (
             **_axes("gyr", "angular_velocity"),
             **_axes("acc", "linear_acceleration"),
         },
+    ),
+    _Program(
+        "mjd: modified Julian dates, taken for UTC (GPS time is 18 s ahead of it since 2017)",
+        frozenset((_MJD,)),
+        {_MJD: "time (utc)"},
+        lacks="time",
     ),
     _Program(
         "columns as of messages of ROS 2",
@@ -241,6 +250,8 @@ def with_full_names(rows: Columns, own: Collection[str]) -> Columns:
         rows.reading.note(f"taken for those of the serving cell: {listed(renamed)}")
     if known is not None:
         rows.reading.note(known.note)
+        if _MJD in known.marks and _MJD not in own:
+            rows = rows.filled(_MJD, _texts(np.round((rows.number(_MJD) - _MJD_EPOCH) * DAY_S, 3)))
         if known.marks >= _ROS_2:
             seconds, nanoseconds = (rows.number(name) for name in sorted(_ROS_2, key=len))
             rows = rows.filled(_SECONDS, _texts(seconds + nanoseconds / 1e9))

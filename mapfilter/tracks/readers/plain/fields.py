@@ -28,16 +28,17 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
     "time": (
         *("time", "time_s", "timestamp", "datetime", "utc", "unix_time", "date_time", "t"),
         *("timestamps", "timestep_time", "time_utc_usec"),
-        *("ts", "time_stamp", "epoch", "unix_timestamp"),
+        *("ts", "time_stamp", "epoch", "unix_timestamp", "tst", "isotst"),
         *("measured_at", "recorded_at", "tow", "tow_s", "gps_tow", "time_of_week"),
         "yyyy-mo-dd hh-mi-ss_sss",
     ),
     "lat_deg": (
-        *("lat_deg", "lat", "latitude", "location latitude :"),
+        *("lat_deg", "lat", "latitude", "location latitude :", "latitude n/s"),
         *("gps_latitude", "gps_lat", "gnss_latitude", "gnss_lat"),
     ),
     "lon_deg": (
         *("lon_deg", "lon", "lng", "long", "longitude", "longtitude", "location longitude :"),
+        "longitude e/w",
         *("gps_longitude", "gps_lon", "gps_long", "gps_lng", "gnss_longitude", "gnss_lon"),
     ),
     "altitude_m": ("altitude_m", "altitude", "ele", "height_m"),

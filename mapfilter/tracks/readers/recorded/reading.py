@@ -70,6 +70,7 @@ class Reading(Remarks):
     date_column: str = ""
     later: Callable[[], Iterable[Any]] = tuple
     value_units: dict[str, str] = field(default_factory=dict)
+    unit_row: dict[str, str] | None = None
     columns: dict[str, str] = field(default_factory=dict)
     kept: list[pd.DataFrame] = field(default_factory=list)
     ending: Callable[[pd.DataFrame], None] | None = None

@@ -218,6 +218,17 @@ class Columns:
         column = pa.chunked_array([pa.array(texts, pa.string())])
         return replace(self, _columns={**self._columns, self.names.index(name): column})
 
+    def first_row(self) -> dict[str, str]:
+        """Return the texts of the first row by column."""
+        columns = ((name, self._raw(name)) for name in self.names)
+        return {name: str(one[0].as_py()).strip() for name, one in columns if one is not None}
+
+    def after_first(self) -> Columns:
+        """Return columns without the first row."""
+        held = {at: one() if callable(one) else one for at, one in self._columns.items()}
+        columns = {at: one.slice(1) for at, one in held.items()}
+        return replace(self, line=self.line[1:], _columns=columns)
+
     def with_column(self, name: str, text: str) -> Columns:
         """Return columns with another one, which has the same text in each row."""
         column = pa.chunked_array([pa.repeat(text, len(self))])

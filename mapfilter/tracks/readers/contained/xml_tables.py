@@ -1,4 +1,4 @@
-"""Points with times in KML (gx:Track, placemarks with a time stamp), and in TCX of Garmin."""
+"""Points with times in KML (gx:Track, placemarks), in TCX, and in GPX that has cells."""
 
 from __future__ import annotations
 
@@ -23,6 +23,13 @@ _TCX = {
     "AltitudeMeters": "altitude_m",
     "Speed": "speed_mps",
 }
+_OF_CELLS = re.compile(
+    rb"<(?:\w{1,20}:)?(?:rsrp|rscp|level_dbm|mcc|cell_?id|cid|eci)>", re.IGNORECASE
+)
+"""Elements that a GPX has only of cells, in the extensions of its points."""
+_LEAF = re.compile(r"<([\w.-]{1,40})>([^<>]{1,200})</")
+_ATTRIBUTE = re.compile(r"\b(lat|lon)\s?=\s?[\"']([^\"'<>]{1,40})[\"']")
+_HEAD_BYTES = 1 << 18
 _LINE = "a line without times, as of a map; export GPX, or points with their times"
 
 
@@ -88,6 +95,33 @@ def tcx_table(text: Text) -> Text:
         hint = "recorded indoors, or an activity without a track"
         raise fail(InputError, str(text.path), "track points with places", "TCX without any", hint)
     return table_of_records(text, records, "TCX")
+
+
+def has_cells(text: Text) -> bool:
+    """Return whether points of a GPX have cells in their extensions."""
+    return any("<gpx" in line for line in text.head[:20]) and bool(
+        _OF_CELLS.search(text.data[:_HEAD_BYTES])
+    )
+
+
+def gpx_table(text: Text) -> Text | None:
+    """Return the points of a GPX with all that their extensions hold as a text of CSV.
+
+    None where no point has a place and a time.
+    """
+    content = _content(text, "GPX")
+    records: list[dict[Path_, str]] = []
+    for tag in ("trkpt", "wpt"):
+        for piece in content.split(f"<{tag} ")[1:]:
+            attributes, _, rest = piece.partition(">")
+            inner, closed, _ = rest.partition(f"</{tag}>")
+            found: dict[Path_, str] = {(name,): value for name, value in _LEAF.findall(inner)}
+            place = dict(_ATTRIBUTE.findall(attributes))
+            if closed and place.keys() >= {"lat", "lon"} and ("time",) in found:
+                records.append({("lat",): place["lat"], ("lon",): place["lon"], **found})
+        if records:
+            break
+    return table_of_records(text, records, "GPX with cells") if records else None
 
 
 def _content(text: Text, what: str) -> str:
