@@ -63,9 +63,10 @@ def _move(state, step_m, length_m, heading_rad, noise, key, moved):  # type: ign
     a, b = normals(np.uint64(hashed(key, np.uint64(4 * i))))
     c, d = normals(np.uint64(hashed(key, np.uint64(4 * i + 1))))
     e, f = normals(np.uint64(hashed(key, np.uint64(4 * i + 2))))
-    u, _ = uniforms(np.uint64(hashed(key, np.uint64(4 * i + 3))))
+    u, v = uniforms(np.uint64(hashed(key, np.uint64(4 * i + 3))))
     lasting = wrap32(state[2, i] + state[7, i] * _F(length_m) + _F(noise.bias_rad) * c)
     steady = state[3, i] + _F(noise.scale) * d
+    steady = _F(noise.rescaled) * d if _F(v) < _F(noise.rescale) else steady
     beside = _F(noise.turn_keep) * state[5, i] + _F(noise.turn_rad) * e
     beside = _F(noise.jump_rad) * e if _F(u) < _F(noise.jump) else beside
     longer = _F(noise.stretch_keep) * state[6, i] + _F(noise.stretch) * f

@@ -73,6 +73,9 @@ class MotionErrors(Options):
         Standard deviation of the logarithm of the step scale at the start.
     scale_drift_per_sqrt_m : float
         Random walk of that logarithm.
+    rescales_per_m, rescaled_sd : float
+        How often that logarithm becomes another one, and the standard deviation of that: speeds
+        that are no wheels' but sums of accelerations begin anew at each stop, with another error.
     stretch_sd, stretch_m : float
         Standard deviation of the deviation of that logarithm, and its correlation length.
     corners_per_m : float
@@ -98,6 +101,8 @@ class MotionErrors(Options):
     rate_share: Share = 0.5
     scale_sd: NotNegative = 0.03
     scale_drift_per_sqrt_m: NotNegative = 0.0
+    rescales_per_m: NotNegative = 0.0
+    rescaled_sd: NotNegative = 0.06
     stretch_sd: NotNegative = 0.08
     stretch_m: Positive = 25.0
     corners_per_m: NotNegative = 0.0
@@ -177,6 +182,8 @@ def noise_of_step(
         errors.stretch_sd * (1 - stretched**2) ** 0.5,
         1 - exp(-errors.disturbances_per_m * length),
         errors.disturbed_rad,
+        1 - exp(-errors.rescales_per_m * length),
+        errors.rescaled_sd,
         (rows + 1) / (2 * rows),
     )
     return step_m * exp(0.5 * white_rad**2), length, noise
@@ -199,6 +206,8 @@ class StepNoise(NamedTuple):
     stretch: float
     jump: float
     jump_rad: float
+    rescale: float
+    rescaled: float
     late: float = 1.0
 
 
@@ -220,6 +229,7 @@ def _move(
     turn_keep, turn_sd = _F(noise.turn_keep), _F(noise.turn_rad)
     stretch_keep, stretch_sd = _F(noise.stretch_keep), _F(noise.stretch)
     jump, jump_sd = _F(noise.jump), _F(noise.jump_rad)
+    rescale, rescaled_sd = _F(noise.rescale), _F(noise.rescaled)
     late, early = _F(noise.late), _F(1.0 - noise.late)
     east, north = state[0, first:stop], state[1, first:stop]
     bias, scale = state[2, first:stop], state[3, first:stop]
@@ -232,9 +242,10 @@ def _move(
         a, b = normals(hashed(key, drawn + np.uint64(4 * i)))
         c, d = normals(hashed(key, drawn + np.uint64(4 * i + 1)))
         e, f = normals(hashed(key, drawn + np.uint64(4 * i + 2)))
-        u, _ = uniforms(hashed(key, drawn + np.uint64(4 * i + 3)))
+        u, v = uniforms(hashed(key, drawn + np.uint64(4 * i + 3)))
         lasting = wrap32(bias[i] + rate[i] * length + bias_sd * c)
         steady = scale[i] + scale_sd * d
+        steady = rescaled_sd * d if _F(v) < rescale else steady
         beside = turn_keep * turn[i] + turn_sd * e
         beside = jump_sd * e if _F(u) < jump else beside
         longer = stretch_keep * stretch[i] + stretch_sd * f

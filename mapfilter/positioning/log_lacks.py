@@ -190,7 +190,7 @@ def lacking(
         lacks.append(f"no serving cell of which the database has points{names}")
     if not moved.any():
         lacks.append(NO_MOTION)
-    elif cells and not (moved & log.motion["heading_rad"].notna()).any() and not turned.any():
+    elif cells and not turned.any():
         lacks.append("no heading")
     elif cells and not (moved & log.motion["heading_rad"].notna()).any() and not turns:
         lacks.append("no heading (turns alone do not give one; the filter bayes needs none)")

@@ -82,7 +82,9 @@ def open_raw_grid(path: Path, cell_id: str, declared: Declared) -> RawGrid:
         raise InputError(tuple(faults.found))
     bits = 8 * np.dtype(dtype).itemsize
     pixels_bytes = cols * bits // 8
-    row_bytes = header.whole("TOTALROWBYTES", pixels_bytes) or 0
+    row_bytes = header.whole("TOTALROWBYTES", pixels_bytes)
+    if row_bytes is None:
+        raise InputError(tuple(faults.found))
     if row_bytes < pixels_bytes:
         expected = f"at least {pixels_bytes} for {cols} pixels of {bits} bits"
         faults.add(f"{header.where}, TOTALROWBYTES", expected, row_bytes)

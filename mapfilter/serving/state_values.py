@@ -17,11 +17,12 @@ import numpy as np
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.models.level_errors import LevelErrors
+from mapfilter.models.level_errors import LevelErrors, LevelReport
 from mapfilter.models.level_memory import LevelMemory
 from mapfilter.positioning.bayes.beliefs.legs import Lead, Leg
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.certainty import Recovery
+from mapfilter.positioning.bayes.clocks import Clocks, HeldReport
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, NullHypothesis
 from mapfilter.positioning.bayes.rivals.half_turns import HalfTurns
 from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
@@ -56,6 +57,7 @@ _CLASSES: dict[str, type] = {
         BeliefSummary,
         Biases,
         Bins,
+        Clocks,
         Contradiction,
         DeadReckoning,
         DifferenceErrors,
@@ -67,11 +69,13 @@ _CLASSES: dict[str, type] = {
         GnssState,
         HalfTurns,
         HeldOtherwise,
+        HeldReport,
         Hold,
         Lead,
         Leg,
         LevelErrors,
         LevelMemory,
+        LevelReport,
         MirroredTwin,
         MotionRepeats,
         MotionStep,

@@ -44,6 +44,7 @@ def read_antennas_log(path: Path) -> Rows:
                 _add_logged(rows, at, cell, operator, found)
             received.clear()
     drop_unplaced()
+    rows.finish()
     return rows
 
 

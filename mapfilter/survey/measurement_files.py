@@ -33,8 +33,11 @@ from mapfilter.survey.measurement_lines import (
     without_last,
 )
 from mapfilter.survey.measurement_rows import FIELDS, REQUIRED, Rows
+from mapfilter.survey.measurement_times import with_date
 
 _UNAVAILABLE = 1e9
+_DATE = "date"
+"""A column of days beside times of day."""
 _FIRST_LINES = 100
 _FEWEST_NUMBERS = 3
 _GSM, _LTE = ("GSM", "GPRS", "EDGE"), ("LTE", "LTE+", "LTE_CA", "NR")
@@ -109,6 +112,7 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
     is_dbm = all(header[at].endswith("dbm") for at in places["level_dbm"])
     stating = [at for at, name in enumerate(header) if name in OF_CARRIERS]
     families = {OF_CARRIERS[header[at]] for at in stating}
+    dates = [at for at, name in enumerate(header) if name == _DATE and at not in places["time"]]
     usual = families.pop() if len(families) == 1 else None
     cut, last = cut_end(path), list[int]()
     for line, text in without_last(lines, last) if cut else lines:
@@ -131,6 +135,8 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
             for name in (*REQUIRED, "accuracy_m"):
                 if "." not in found[name]:
                     found[name] = found[name].replace(",", ".")
+        if dates:
+            found["time"] = with_date(found["time"], fields[dates[0]].strip())
         cell = rows.identify(line, found["cell"], [found[name] for name in IDENTITY])
         if not cell:
             continue
@@ -144,6 +150,7 @@ def read_csv(path: Path, dialect: Dialect) -> Rows:
             rows.aside["levels given as ASU (turned into dBm)"] += 1
             found["level_dbm"] = repr(dbm)
         rows.add(line, cell, found)
+    rows.finish()
     if last:
         rows.read += 1
         rows.refuse(last[0], "line", "a whole row", f"one {cut}")

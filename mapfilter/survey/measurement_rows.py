@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-import re
 from array import array
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TypeVar
 
@@ -16,18 +14,20 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter._words import counted, number_of
+from mapfilter.clocks.time_hints import hint_on_time
 from mapfilter.degrees import degree_fault
 from mapfilter.errors import Fault, InputError
 from mapfilter.radio.asu import LARGEST_ASU, LOST_SIGN, is_above_asu
 from mapfilter.radio.cell_rules import RANGES, id_fault
 from mapfilter.radio.identities import IDENTITY
 from mapfilter.radio.tables import number
+from mapfilter.survey.measurement_times import WaitingTimes
 
 _FAULTS_KEPT = 20
 _FAULTS_SHOWN = 3
-_LATEST_S = 4_102_444_800.0
 _UNAVAILABLE = 2_000_000_000.0
 _LEVEL_DBM = (-170.0, -10.0)
+_PARTS = 7
 _MOST_STEPS = 3846.0
 """Timing advances: of NR 0 to 3846, fewer of older technologies."""
 _YES = ("1", "true", "yes", "neighbour", "neighbor")
@@ -43,10 +43,6 @@ FIELDS = (
 NO_TIME = "times not understood (levels kept)"
 NO_CODE = "carriers or codes that are not possible (levels kept)"
 _TIMES = "expected ISO 8601 (2026-05-01T10:00:00+02:00), 31.12.2026 10:00:00 or Unix s, ms or µs"
-_DOTTED = re.compile(r"(\d\d?)\.(\d\d?)\.((?:19|20)\d\d)[ T]+(\d\d?):(.*)", re.ASCII)
-"""Day, month and year with dots, which no one writes in another order, and a time."""
-_LEAP = re.compile(r"(?:(?<=\d:[0-5]\d:)|(?<=\dT\d{4}))60(?=\D|$)", re.ASCII)
-"""Second 60 of a time of day."""
 
 
 class NotMeasurementsError(InputError):
@@ -68,7 +64,8 @@ class Rows:
     ``cell`` and ``session`` are numbers given in ``cells`` and ``sessions``; ``technologies`` and
     ``codes`` count how often cells have been GSM, UMTS, LTE or NR, and had a carrier and code
     (:func:`most_frequent`); ``identified`` is the cell of identities that were looked at before,
-    ``odd_time`` the first time not understood; ``remarks`` are on the file as a whole.
+    ``odd_time`` the first time not understood; ``remarks`` are on the file as a whole. Times that
+    are no numbers are those of ``waiting`` until :meth:`finish`.
     """
 
     path: Path
@@ -87,6 +84,7 @@ class Rows:
     aside: Counter[str] = field(default_factory=Counter)
     odd_time: str = ""
     remarks: list[str] = field(default_factory=list)
+    waiting: WaitingTimes = field(default_factory=WaitingTimes)
 
     @property
     def columns(self) -> Floats:
@@ -95,7 +93,7 @@ class Rows:
         Unix seconds, latitude, longitude (WGS 84), level (dBm), accuracy (m), timing advance
         (steps), and 1 for a serving cell, 0 for a neighbour.
         """
-        return np.array(self.values).reshape(-1, 7).T
+        return np.array(self.values).reshape(-1, _PARTS).T
 
     def refuse(self, line: int, name: str, expected: str, got: object, hint: str = "") -> None:
         """Count a bad row and keep the faults of the first ones."""
@@ -160,10 +158,8 @@ class Rows:
                 hint = "the marker of a level that was not available"
             self.refuse(line, "level_dbm", expected, given["level_dbm"][:40], hint)
             return
-        time_s, accuracy_m = unix_seconds(given["time"]), number(given["accuracy_m"]) or math.nan
-        if given["time"] and math.isnan(time_s):
-            self.aside[NO_TIME] += 1
-            self.odd_time = self.odd_time or f"{given['time'][:40]!r} in line {line}"
+        time_s = self.waiting.seconds(len(self.cell), line, given["time"])
+        accuracy_m = number(given["accuracy_m"]) or math.nan
         if not 0 < accuracy_m < _UNAVAILABLE:
             accuracy_m = math.nan
         self.cell.append(self.cells.setdefault(cell, len(self.cells)))
@@ -180,6 +176,21 @@ class Rows:
         said = given["neighbour"].lower()
         serving = 0.0 if said in _YES else 1.0 if said in _NO else math.nan
         self.values.extend((time_s, lat_deg, lon_deg, level_dbm, accuracy_m, steps, serving))
+
+    def finish(self) -> None:
+        """Read the times of all rows that are no numbers, when there are no more rows."""
+        time_s, notes = self.waiting.read()
+        self.remarks += notes
+        for row, value in zip(self.waiting.rows, time_s.tolist(), strict=True):
+            self.values[_PARTS * row] = value
+        odd = np.flatnonzero(np.isnan(time_s))
+        if odd.size:
+            first = int(odd[0])
+            text = self.waiting.text(first)
+            self.aside[NO_TIME] += odd.size
+            self.odd_time = f"{text[:40]!r} in line {self.waiting.lines[first]}"
+            hint = hint_on_time(text)
+            self.odd_time += f" ({hint})" if hint else ""
 
     def notes(self) -> list[str]:
         """Return remarks on how many rows were refused or set aside, and where the first are."""
@@ -211,37 +222,6 @@ def most_frequent(counts: Iterable[Counter[tuple[str, _ToldT]]]) -> dict[str, _T
         total.update(one)
     ordered = sorted((count, said) for said, count in total.items())
     return {cell: value for _, (cell, value) in ordered}
-
-
-def unix_seconds(text: str) -> float:
-    """Return Unix seconds of a time (UTC by default) or of s, ms or µs; else NaN.
-
-    Times are ISO 8601, or begin with day, month and year with dots; a leap second (``:60``) is the
-    first second of the next minute.
-
-    Examples
-    --------
-    >>> unix_seconds("1599319703000"), unix_seconds("2020-09-05T15:28:23Z")
-    (1599319703.0, 1599319703.0)
-    >>> unix_seconds("05.09.2020 15:28:23"), unix_seconds("05.09.2020")
-    (1599319703.0, nan)
-    """
-    seconds = number(text)
-    if seconds is not None:
-        seconds /= 1e6 if seconds > 1e14 else 1e3 if seconds > 1e11 else 1.0
-    else:
-        if dotted := _DOTTED.fullmatch(text.strip()):
-            day, month, year, hour, rest = dotted.groups()
-            text = f"{year}-{int(month):02d}-{int(day):02d}T{int(hour):02d}:{rest.strip()}"
-        leap = _LEAP.search(text)
-        text = _LEAP.sub("59", text, count=1) if leap else text
-        try:
-            moment = datetime.fromisoformat(text)
-            seconds = (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
-        except (ValueError, OverflowError):
-            return math.nan
-        seconds += 1 if leap else 0
-    return seconds if 0 < seconds < _LATEST_S else math.nan
 
 
 def _whole(text: str) -> int | None:

@@ -52,7 +52,7 @@ from mapfilter.tracks.schema import PLACE, TABLES
 from mapfilter.tracks.stated_crs import placed_in
 from mapfilter.tracks.tables import tidy_table
 
-_PLACED = ("gnss", "truth")
+_PLACED, _AXES = ("gnss", "truth"), ("east_m", "north_m")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -268,7 +268,7 @@ def make_log(
         if not any(TIMES_BEGIN in note for note in every_note):
             every_note += odd_start(start_utc_s, tables, whole)
         for name in _PLACED if not faults.found else ():
-            east_m, north_m = tables[name][["east_m", "north_m"]].to_numpy(np.float64).T
+            east_m, north_m = (tables[name][axis].to_numpy(np.float64) for axis in _AXES)
             check_metres(called.get(name, name), str(crs), east_m, north_m, faults)
         if not faults.found and not any(FAR_APART in note for note in every_note):
             every_note += truth_far_off(str(crs), tables)
@@ -283,7 +283,8 @@ def make_log(
                 if not any(found in note for note in every_note):
                     every_note += (f"{called.get('motion', 'motion')}, {column}: {wrong}",)
     faults.raise_if_any(InputError)
-    placeless = int(tables["pseudoranges"][list(PLACE)].isna().any(axis=1).sum())
+    ranges = tables["pseudoranges"]
+    placeless = int(ranges[list(PLACE)].isna().any(axis=1).sum()) if len(ranges) else 0
     if almanac is None and placeless and not any(UNPLACED in note for note in every_note):
         why = "without the place of their satellite: give the day's navigation file (RINEX), too"
         every_note += (f"pseudoranges: {number_of(placeless, 'row')} {why}",)

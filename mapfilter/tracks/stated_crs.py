@@ -27,7 +27,7 @@ def placed_in(crs: str, rows: pd.DataFrame) -> pd.DataFrame:
     ('EPSG:32635', '')
     """
     stating = rows.copy(deep=False)
-    places_m = rows[_PLACE].to_numpy(dtype=np.float64)
+    places_m = np.column_stack([rows[name].to_numpy(dtype=np.float64) for name in _PLACE])
     # A text, as pandas copies the attributes with every table that it makes.
     bounds_m = " ".join(map(repr, _bounds_m(places_m)))
     stating.attrs = {**rows.attrs, _CRS: crs, _BOUNDS: bounds_m}

@@ -222,7 +222,8 @@ def _check_degrees(table: pd.DataFrame, found: TableFaults) -> None:
 
 def _check_milliseconds(table: str, rows: pd.DataFrame, found: TableFaults) -> None:
     """Find times in milliseconds: rows seldom come, and what gets somewhere goes very slowly."""
-    time = np.unique(rows["time_s"].to_numpy())
+    time = rows["time_s"].to_numpy()
+    time = time if (np.diff(time) > 0).all() else np.unique(time)
     if len(time) < 3 or table not in _MOVING or not np.isfinite(time).all():
         return
     between_s = float(np.median(np.diff(time)))
@@ -230,7 +231,7 @@ def _check_milliseconds(table: str, rows: pd.DataFrame, found: TableFaults) -> N
         moved_m = float(np.nansum(np.abs(rows["step_m"].to_numpy())))
     else:
         # Not the path's length: the fixes of a parked car jitter.
-        moved_m = float(np.hypot(np.ptp(rows["east_m"]), np.ptp(rows["north_m"])))
+        moved_m = float(np.hypot(*(np.ptp(rows[n].to_numpy()) for n in ("east_m", "north_m"))))
     speed_mps = moved_m / (time[-1] - time[0])
     if between_s >= _SELDOM_S and moved_m >= _SOMEWHERE_M and speed_mps < _SLOW_MPS:
         got = f"{between_s:g} between rows, hence {speed_mps:.2g} m/s"
@@ -259,7 +260,10 @@ def _sorted_unique(
 def _repeated(table: pd.DataFrame) -> Bools:
     """Return which rows equal an earlier one, part by part where that needs less memory."""
     time_s = table["time_s"].to_numpy()
-    if not (np.diff(time_s) >= 0).all():
+    between_s = np.diff(time_s)
+    if (between_s > 0).all():
+        return np.zeros(len(table), dtype=np.bool_)
+    if not (between_s >= 0).all():
         return np.asarray(table.duplicated())
     # Equal rows have equal times, so no part ends between them.
     cuts = np.searchsorted(time_s, time_s[_ROWS_AT_ONCE::_ROWS_AT_ONCE])

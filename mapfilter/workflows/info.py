@@ -25,6 +25,8 @@ _TABLES = (".csv", ".txt", ".tsv", ".xlsx", ".xls", ".ods")
 _INDEX_COLUMN = b"TX_NAME"
 _LONGEST_LINE_BYTES = 1 << 16
 _LEAST_OF_PLAN = 2
+_OF_CELLS = (b"CellIdentity", b"+QENG:")
+"""In texts of Android's cells, and of a modem's replies."""
 _PLACES = {"lat", "lon", "latitude", "longitude", "x", "y", "east", "north", "mcc", "mnc"}
 _PLAN = {name.casefold() for name in (*COLUMNS, *(n for names in ATOLL.values() for n in names))}
 _EXPECTED = "a database, raster, log, recording, map, layer, table or result"
@@ -111,12 +113,16 @@ def _file_info(path: Path) -> dict[str, Any]:
     if suffix == ".parquet":
         whole = (path.parent / MANIFEST).exists()
         hint = "a part of a database; name the folder that it lies in"
-        hint = hint if whole else "pandas, geopandas and QGIS open it"
+        of_frame = f"pandas, geopandas and QGIS open it; of a journey: {_USE_OF_RECORDINGS}"
+        hint = hint if whole else of_frame
         raise fail(InputError, str(path), _EXPECTED, "a Parquet file", hint)
     if suffix in _LAYERS or (suffix == ".json" and _is_geojson(path)):
+        from mapfilter.tracks.readers.formats import format_of
         from mapfilter.workflows.descriptions.geo import layers_info
 
-        return layers_info(path)
+        found = layers_info(path)
+        journey = f"; points with times: {_USE_OF_RECORDINGS}"
+        return found if format_of(path) is None else {**found, "use": f"{found['use']}{journey}"}
     if suffix == ".mat":
         use = "fingerprints: mapfilter evaluate single-reports reads those that its page names"
         return {"kind": "MATLAB file", "bytes": path.stat().st_size, "use": use}
@@ -128,9 +134,14 @@ def _file_info(path: Path) -> dict[str, Any]:
     from mapfilter.tracks.readers.formats import format_of
     from mapfilter.tracks.readers.texts.zipped import files_in_zip, is_zip
 
-    if format_of(path) is not None:
+    # Texts of cells without times are refused with what they lack.
+    if format_of(path) is not None or any(mark in _beginning(path) for mark in _OF_CELLS):
         return _recording_info(path)
     if is_zip(path):
+        from mapfilter.tracks.zipped_logs import UNPACK, is_zipped_log
+
+        if is_zipped_log(path):
+            raise fail(InputError, str(path), _EXPECTED, "a ZIP", UNPACK)
         formats = [known.name for one in files_in_zip(path) if (known := format_of(one))]
         if found := _recordings_info(formats, _USE_OF_RECORDINGS):
             return found

@@ -5,11 +5,11 @@ import pandas as pd
 import pytest
 
 from mapfilter._constants import LIGHT_MPS
+from mapfilter.clocks.times import utc_from_gps_s
 from mapfilter.gnss.almanacs import nominal_gps
 from mapfilter.gnss.atmosphere import directions, ionosphere_m, receiver_m, troposphere_m
 from mapfilter.gnss.broadcast import gps_from_utc_s, place_by_broadcast, satellite_states
 from mapfilter.gnss.orbits import EARTH_RATE_RAD_S, satellite_positions_m
-from mapfilter.tracks.readers.clocks.times import utc_from_gps_s
 
 WEEK = 2416
 TOE_S = WEEK * 604_800.0 + 468_000.0

@@ -89,19 +89,14 @@ def study(given, true, rng, *, journeys=8, silent=(), error_db=6.0, phone_db=3.0
             along = np.arange(0.0, 1200.0, SQUARE_M) + SQUARE_M / 2
             across = np.full(along.size, line)
             x, y = (along, across) if rng.random() < 0.5 else (across, along)
-            there = (x + 600.0) % 1200.0, (y + 450.0) % 1200.0
+            place = (x, y)
+            if journey in lost:
+                place = (x + 600.0) % 1200.0, (y + 450.0) % 1200.0
+            levels = [level_dbm(cell, EAST + place[0], NORTH + place[1]) for cell in true.cells]
             for n in range(along.size):
+                there = place[0][n], place[1][n], [float(level[n]) for level in levels]
                 rows += _visit(
-                    journey,
-                    x[n],
-                    y[n],
-                    true,
-                    silent,
-                    shadow,
-                    error_db,
-                    phone,
-                    rng,
-                    (there[0][n], there[1][n]) if journey in lost else (x[n], y[n]),
+                    journey, x[n], y[n], true, silent, shadow, error_db, phone, rng, there
                 )
     table = np.array(rows, dtype=float)
     visits = Visits(
@@ -121,15 +116,14 @@ def study(given, true, rng, *, journeys=8, silent=(), error_db=6.0, phone_db=3.0
 
 
 def _visit(journey, x, y, true, silent, shadow, error_db, phone, rng, place):
-    """Rows of one visit: what is received at ``place`` is said to be of (x, y)."""
+    """Rows of one visit: what is received at ``place``, levels of all cells, is said of (x, y)."""
     square = math.floor(place[0] / SQUARE_M), math.floor(place[1] / SQUARE_M)
     number = math.floor(x / SQUARE_M) * 100 + math.floor(y / SQUARE_M)
-    east, north = EAST + place[0], NORTH + place[1]
     found = []
     for c, cell in enumerate(true.cells):
         if (c, square) not in shadow:
             shadow[c, square] = error_db * rng.standard_normal()
-        level = float(level_dbm(cell, np.array([east]), np.array([north]))[0])
+        level = place[2][c]
         level += shadow[c, square] + phone + 2.0 * rng.standard_normal()
         found.append(-np.inf if cell.id in silent else level)
     order = np.argsort(found)[::-1][:7]

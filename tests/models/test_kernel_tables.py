@@ -79,6 +79,8 @@ def test_the_usual_options():
         "rate_share": 0.5,
         "scale_sd": 0.03,
         "scale_drift_per_sqrt_m": 0.0,
+        "rescales_per_m": 0.0,
+        "rescaled_sd": 0.06,
         "stretch_sd": 0.08,
         "stretch_m": 25.0,
         "corners_per_m": 0.0,

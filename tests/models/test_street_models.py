@@ -221,6 +221,32 @@ def test_deviations_jump_now_and_then_to_any_value_within_tens_of_degrees():
                                   after[[BIAS, LOG_SCALE, STRETCH]])  # fmt: skip
 
 
+def test_the_lasting_scale_becomes_another_one_now_and_then():
+    errors = replace(EXACT, rescales_per_m=0.02, rescaled_sd=0.06)
+    before = states(COUNT, 0.0, -0.3)
+    after = move(before, 5.0, 0.0, errors, KEY)
+    anew = after[LOG_SCALE] != np.float32(-0.3)
+    share = 1 - exp(-0.02 * 5.0)
+    assert anew.mean() == pytest.approx(share, abs=SPREAD * sqrt(share))
+    # Around none, not around the one before; the step is as long as it says.
+    found = after[LOG_SCALE, anew].astype(float)
+    assert found.std() == pytest.approx(0.06, rel=SPREAD / sqrt(share))
+    assert abs(found.mean()) < 0.06 * SPREAD / sqrt(share)
+    gone_m = (after[EAST] - before[EAST]).astype(float)
+    np.testing.assert_allclose(gone_m, 5.0 * np.exp(after[LOG_SCALE]), rtol=1e-4)
+    # All else is drawn as without.
+    noisy = replace(OU, scale_drift_per_sqrt_m=0.05, disturbances_per_m=0.02)
+    calm = move(before, 5.0, 0.0, noisy, KEY)
+    often = move(before, 5.0, 0.0, replace(noisy, rescales_per_m=0.02), KEY)
+    rest = [BIAS, TURN, STRETCH]
+    np.testing.assert_array_equal(calm[rest], often[rest])
+    same = calm[LOG_SCALE] == often[LOG_SCALE]
+    assert same.mean() == pytest.approx(1 - share, abs=SPREAD * sqrt(share))
+    # Jumps of headings are drawn by themselves.
+    jumped = np.abs(often[TURN] - exp(-0.25) * before[TURN]) > 1.0
+    assert abs(np.corrcoef(jumped, ~same)[0, 1]) < SPREAD
+
+
 def test_after_a_jump_the_deviation_comes_back_over_the_metres():
     errors = replace(OU, heading_sd_rad=0.0)
     state = states(3)

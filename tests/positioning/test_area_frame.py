@@ -138,3 +138,16 @@ def test_levels_that_are_not_in_the_database_are_six_decibels_below_its_floor():
     held = make_area().level_dbm[..., :4]
     assert (held.min(), FLOOR_DBM) == (-116.0, -110.0)
     np.testing.assert_array_equal(held, LEVEL_DBM)
+
+
+@pytest.mark.parametrize(
+    ("layers", "layer_of", "bands", "strongest"),
+    [((), [0, 0, 0], 5, [3, 3, 3]), ((0, 1, 0), [0, 1, 0], 7, [3, 5, 3])],
+)
+def test_without_layers_all_cells_are_of_one(layers, layer_of, bands, strongest):
+    """Behind the cells' bands are the strongest and the second strongest of each layer."""
+    frame = Frame(2, 3, cell_ids=("a", "b", "c"))
+    frame.layers = layers
+    assert frame.layer_of.tolist() == layer_of
+    assert frame.bands == bands
+    assert [frame.strongest(band) for band in range(3)] == strongest

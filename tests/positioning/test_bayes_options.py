@@ -181,6 +181,19 @@ def test_a_vehicle_has_its_own_motion_whatever_its_headings_errors_are():
     assert (driven.motion.heading_sd_rad, driven.motion.disturbances_per_m) == (radians(30.0), 0.0)
 
 
+def test_only_vehicles_among_cells_may_have_speeds_with_another_scale_after_a_stop():
+    among = BayesFilter(vehicle=True).over_area(make_area()).model.motion
+    assert (among.rescales_per_m, among.rescaled_sd) == (1 / 1000, pytest.approx(0.06))
+    # A smaller error that is stated leaves smaller ones.
+    stated = BayesFilter(vehicle=True, scale=0.005).over_area(make_area()).model.motion
+    assert stated.rescaled_sd == pytest.approx(0.015)
+    for options, area in (
+        (BayesFilter(), make_area()),
+        (BayesFilter(vehicle=True), without_cells()),
+    ):
+        assert options.over_area(area).model.motion.rescales_per_m == 0.0
+
+
 def test_a_grid_is_on_the_device_that_is_asked_for():
     found = GridFilter().over_area(make_area())
     assert (found.grid, found.device.name) == (True, "cpu")

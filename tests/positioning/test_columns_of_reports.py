@@ -60,6 +60,19 @@ def test_many_faults_are_counted():
     )
     assert [one.got for one in report] == ["7", "7", "7", "6 more readings like these"]
     assert [one.got for one in level] == ["-300.0"] * 3 + ["6 more readings like these"]
+    with pytest.raises(MapfilterError) as caught:
+        made(level_dbm=[-300.0] * 3)
+    assert [one.got for one in caught.value.faults] == ["-300.0"] * 3
+
+
+def test_what_columns_hold_is_looked_at_once_they_are_of_one_length():
+    with pytest.raises(MapfilterError) as caught:
+        made(report=(0, 0, 9), cell=("a", ""))
+    assert [one.where for one in caught.value.faults] == ["readings, cell"]
+    with pytest.raises(MapfilterError) as caught:
+        made(report=(0, 0, 9), cell=("a", "", "a"))
+    wrong = ["reading 3, report", "reading 2, cell"]
+    assert [one.where for one in caught.value.faults] == wrong
 
 
 @pytest.mark.parametrize(

@@ -112,7 +112,7 @@ def test_what_wrong_headings_may_have_led_to_is_no_jump(gone_m, agreed_s, waits_
     for k in range(140):
         # 55.6 m are far for a deviation of 5 m, which counts as 7.5 m.
         off_m = np.array([200.0, 0.0])
-        fix = ComparedFix(1000.0 + k, off_m, one, 25.0 * one, gone_m=gone_m)
+        fix = ComparedFix(1000.0 + k, off_m, one, 25.0 * one, False, False, gone_m)
         record, found = record.at_fix(fix, WAITS)
         if found.ruling is Ruling.ANEW:
             break
@@ -222,7 +222,8 @@ def test_what_fixes_mean_by_hand():
 
     def given(record, off_m, time_s=0.0, *, rests=False):
         place = np.array([off_m, 0.0])
-        return record.at_fix(ComparedFix(time_s, place, 4.0 * one, 12.0 * one, rests), WAITS)
+        fix = ComparedFix(time_s, place, 4.0 * one, 12.0 * one, rests, False, 0.0)
+        return record.at_fix(fix, WAITS)
 
     record, found = given(FixRecord(), 8.0)
     assert (found.ruling, found.squared, found.larger) == (Ruling.AGREES, 2.0, 1.0)
@@ -260,7 +261,7 @@ def test_fixes_on_a_line_while_one_stands():
         record, found = FixRecord(agreed=9), None
         for k in range(count):
             off_m = np.array([40.0 + speed_mps * every_s * k, 0.0])
-            given = ComparedFix(every_s * k, off_m, np.eye(2), np.eye(2), rests)
+            given = ComparedFix(every_s * k, off_m, np.eye(2), np.eye(2), rests, False, 0.0)
             record, found = record.at_fix(given, WAITS)
         return found.ruling
 
@@ -335,7 +336,8 @@ def test_a_belief_is_settled_after_ten_fixes_that_agree():
     one, record = np.eye(2), FixRecord(begun=2)
     for k in range(10):
         assert record.is_lost
-        record, _ = record.at_fix(ComparedFix(float(k), np.zeros(2), one, one), WAITS)
+        fix = ComparedFix(float(k), np.zeros(2), one, one, False, False, 0.0)
+        record, _ = record.at_fix(fix, WAITS)
     assert (record.begun, record.is_lost) == (0, False)
 
 

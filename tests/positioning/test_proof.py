@@ -8,7 +8,7 @@ from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.positioning.epochs import Epoch, GnssFix
 from mapfilter.positioning.gnss.wander import WanderFix
 from mapfilter.positioning.kalman.filter import KalmanFilter
-from mapfilter.positioning.kalman.proof import Doubt, _usual_mps, way_agrees
+from mapfilter.positioning.kalman.proof import Doubt, usual_mps, way_agrees
 from mapfilter.radio.cells import CellPlan
 
 EAST, NORTH, LASTS_S = 500_000.0, 4_600_000.0, 30.0
@@ -53,9 +53,9 @@ def test_a_way_agrees_turned_by_any_angle_but_not_drawn_out(mps):
 def test_the_usual_speed_is_that_of_the_whole_way(every_s):
     """There and back; of less than a second as of one."""
     way = 3.0 * every_s * np.array([0, 1, 2, 2 + 1j, 2, 1])
-    assert _usual_mps(rows_of(way, 0 * way, every_s)) == pytest.approx(3.0)
-    assert _usual_mps(rows_of(way[:2], 0 * way[:2], every_s)) == pytest.approx(min(3 * every_s, 3))
-    assert _usual_mps(rows_of(way[:1], 0 * way[:1])) == 0.0
+    assert usual_mps(rows_of(way, 0 * way, every_s)) == pytest.approx(3.0)
+    assert usual_mps(rows_of(way[:2], 0 * way[:2], every_s)) == pytest.approx(min(3 * every_s, 3))
+    assert usual_mps(rows_of(way[:1], 0 * way[:1])) == 0.0
 
 
 def test_fixes_that_lie_elsewhere_do_not_agree():

@@ -140,3 +140,32 @@ def test_fixes_that_jump_do_not_fit():
         fits = Stretches.of(rows, LASTS_S).fits
         assert fits[20:25].all()
         assert fits[10:20].any() != jumps
+
+
+@pytest.mark.parametrize(("aside_m", "jumps"), [(51.9, False), (52.1, True)])
+def test_a_jump_is_by_the_errors_of_the_two_fixes_beside_it(aside_m, jumps):
+    """Four times 13 m, of one of 5 m and one of 12 m. What others state is nothing to it."""
+    way = np.zeros(20) + 5.0j * np.arange(20)
+    rows = rows_of(way, way + aside_m * (np.arange(20) >= 12), 4000.0)
+    # Steps lead 5 m north meanwhile, and fixes as far to the side and north.
+    rows[:, 3] = EAST + np.where(np.arange(20) >= 12, np.sqrt((aside_m + 5.0) ** 2 - 25.0), 0.0)
+    for others_m in (1.0, 90.0):
+        rows[:, 10] = others_m
+        rows[11, 10], rows[12, 10] = 5.0, 12.0
+        if others_m == 90.0:
+            assert Stretches.of(rows, LASTS_S).fits[11] != jumps
+        # With 1 m no other pair jumps, either.
+        assert Stretches.of(rows, LASTS_S).fits[:12].any() != jumps
+        assert Stretches.of(rows, LASTS_S).fits[12]
+
+
+@pytest.mark.parametrize(("residual_m2", "fits"), [(200.0, True), (204.0, False)])
+def test_what_lasts_of_the_last_fix_may_be_left_of_a_line(residual_m2, fits):
+    """101 m² of the last fix, 125 m² of the second: a line takes most of what lasts away."""
+    way = 5.0 * np.arange(8.0) + 0j
+    bent = np.array([1.0, -1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0])
+    rows = rows_of(way, way + 1j * bent * np.sqrt(residual_m2 / 8), 1.0, 0.0, 10.0, every_s=0.001)
+    rows[1, 5] = 25.0
+    found = Stretches.of(rows, LASTS_S)
+    assert found.residual_m2[0] == pytest.approx(residual_m2, rel=1e-3)
+    assert found.fits[0] == fits

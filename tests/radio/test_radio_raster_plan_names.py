@@ -179,3 +179,12 @@ def test_a_cell_of_which_one_row_is_switched_off_still_names_its_raster():
 def test_a_row_without_a_name_that_is_switched_off_names_no_raster():
     off = replace(plan("S1A"), inactive=("",))
     assert named_by_plan(rasters("odd"), off).cell_ids == ("odd",)
+
+
+def test_an_id_may_begin_within_another_place_of_it():
+    """Of equally good texts before and after it those before are the longest."""
+    for name, cell_id, prefix in (("x11", "1", "x1"), ("x111y", "11", "x1")):
+        found = named_by_plan(rasters(name), plan(cell_id))
+        assert found.cell_ids == (cell_id,)
+        suffix = name.removeprefix(prefix + cell_id)
+        assert found.notes[-1] == f"rasters named {prefix}*{suffix}, where * is a cell of the plan"

@@ -152,3 +152,19 @@ def test_a_header_of_envi_is_named_as_that(tmp_path):
     with pytest.raises(InputError, match=r"a\.hdr: .* found ENVI .*gdal_translate") as caught:
         open_raw_grid(path, "A", Declared())
     assert len(caught.value.faults) == 1
+
+
+@pytest.mark.parametrize("given", ["4.5", "-4", "wide"])
+def test_a_length_of_rows_that_is_none_is_told_once(tmp_path, given):
+    (fault,) = faults(tmp_path, bytes(12), f"TOTALROWBYTES {given}\n")
+    assert fault[0] == "a.hdr, TOTALROWBYTES"
+    assert given in fault[2]
+
+
+def test_rows_as_long_as_their_pixels_or_longer(tmp_path):
+    assert raw(tmp_path, bytes(12), "TOTALROWBYTES 4\n").row_bytes == 4
+    assert raw(tmp_path, bytes(14), "TOTALROWBYTES 5\n").row_bytes == 5
+    for given in (3, 0):
+        found = faults(tmp_path, bytes(12), f"TOTALROWBYTES {given}\n")
+        least = "at least 4 for 4 pixels of 8 bits"
+        assert found[0] == ("a.hdr, TOTALROWBYTES", least, str(given))

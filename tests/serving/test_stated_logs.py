@@ -4,6 +4,7 @@ import asyncio
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from asking import SERVING, SMALL, ask, documents, service
 from positioning.cross_world import make_plan
@@ -36,18 +37,21 @@ def stating(stated):
         radio = radio.assign(level_step_db=10.0)
     given = make_log(log.crs, motion=log.motion, radio=radio, start_utc_s=log.start_utc_s)
     given = replace(given, vehicle=stated.get("vehicle"))
-    sent = []
-    for time_s in sorted({*given.motion["time_s"], *radio["time_s"]}):
-        tables = {"motion": given.motion, "radio": given.radio}
-        rows = {
-            name: [
-                {key: value for key, value in row.items() if value == value and key != "time_s"}
-                for row in table[table["time_s"] == time_s].dropna(axis=1).to_dict("records")
-            ]
-            for name, table in tables.items()
-        }
-        sent.append({"time_s": time_s, **rows})
+    rows = {"motion": _by_time(given.motion), "radio": _by_time(given.radio)}
+    sent = [
+        {"time_s": time_s, **{name: of.get(time_s, []) for name, of in rows.items()}}
+        for time_s in sorted({*rows["motion"], *rows["radio"]})
+    ]
     return given, sent
+
+
+def _by_time(table):
+    """The known values of a table's rows, by their time."""
+    found = {}
+    for row in table.to_dict("records"):
+        known = {key: value for key, value in row.items() if not pd.isna(value)}
+        found.setdefault(known.pop("time_s"), []).append(known)
+    return found
 
 
 def same_fixes(fixes, estimate):

@@ -6,13 +6,13 @@ from math import nan
 import numpy as np
 import pytest
 
-from mapfilter.errors import ConfigError
-from mapfilter.tracks.readers.clocks.local_times import (
+from mapfilter.clocks.local_times import (
     change_notes,
     is_beside_change,
     parse_zone,
     utc_from_local_s,
 )
+from mapfilter.errors import ConfigError
 
 BERLIN, HOWE, JOHNS = "Europe/Berlin", "Australia/Lord_Howe", "America/St_Johns"
 

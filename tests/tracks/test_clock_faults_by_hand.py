@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from mapfilter.clocks.local_times import utc_from_local_s
 from mapfilter.errors import Faults
 from mapfilter.tracks.joining.named_files import check_origin, offsets_by_path
 from mapfilter.tracks.readers.clocks.local_parts import note_changes
-from mapfilter.tracks.readers.clocks.local_times import utc_from_local_s
 from mapfilter.tracks.readers.clocks.set_back import set_back_by
 from mapfilter.tracks.readers.clocks.stray_times import stray_times
 from mapfilter.tracks.readers.recorded.reading import Reading

@@ -325,3 +325,36 @@ def test_the_zone_of_a_date_does_not_move_it(tmp_path):
         log.start_utc_s + log.gnss["time_s"].iloc[0]
         == pd.Timestamp("2026-05-01T08:00:01Z").timestamp()
     )
+
+
+@pytest.mark.parametrize(
+    ("head", "row"),
+    [
+        ("header.stamp.sec,header.stamp.nanosec", "{},500000000"),
+        ("ts", "{}.5"),
+        ("time_stamp", "{}.5"),
+        ("Event Time", "{}.5"),
+        ("epoch", "{}.5"),
+        (
+            "UTC_Nano,UTC_Year,UTC_Month,UTC_Day,UTC_Hour,UTC_Minute,UTC_Second",
+            "500000000,2026,5,13,8,0,0{at}",
+        ),
+    ],
+)
+def test_times_of_converters_by_their_names(tmp_path, head, row):
+    """Of all of them a table was without a column of times."""
+    start_s = 1_778_659_200  # 2026-05-13T08:00:00Z
+    rows = [row.format(start_s + at, at=at) + f",60.17{at},24.94" for at in range(3)]
+    path = tmp_path / "fix.csv"
+    path.write_text("\n".join([f"{head},GPS_Latitude,GPS_Longitude", *rows]) + "\n")
+    found = read_recording(path)
+    assert found.tables["positions"]["time_s"].tolist() == [start_s + at + 0.5 for at in range(3)]
+    assert found.clock.kind == "utc"
+
+
+def test_a_table_without_names_is_said_to_be_one(tmp_path):
+    """Its values were listed as names of columns, of which some should be named."""
+    path = tmp_path / "log.csv"
+    path.write_text("1778659200000;60.1686;24.938;-80\n1778659201000;60.1687;24.938;-81\n")
+    with pytest.raises(InputError, match="a table without a line of names: write one above it"):
+        read_recording(path)

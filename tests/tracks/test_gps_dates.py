@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 
 import mapfilter as mf
+from mapfilter.clocks.times import utc_from_week_s
 from mapfilter.errors import InputError
 from mapfilter.tracks.open_log import open_log
-from mapfilter.tracks.readers.clocks.times import utc_from_week_s
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
 

@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 from made_recordings import MADE
 
+from mapfilter.clocks import times
 from mapfilter.errors import Faults, InputError
 from mapfilter.tracks.checks.log_checks import check_steps
 from mapfilter.tracks.readers import gnettrack, smartloc
-from mapfilter.tracks.readers.clocks import times
 from mapfilter.tracks.readers.formats import read_recording
 
 DIGITS = "²³٣７"

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import mapfilter as mf
+from mapfilter.clocks.times import parse_times
 from mapfilter.survey.antennas_log import _iso
-from mapfilter.survey.measurement_rows import unix_seconds
-from mapfilter.tracks.readers.clocks.times import parse_times
+from mapfilter.survey.measurement_times import read_times
 
 NEW_YEAR_S = 1_483_228_800.0
 ISO = [
@@ -23,6 +23,10 @@ NONE = [
     "2016-12-31T23:59:61Z",
     "20161231T236000Z",
 ]
+
+
+def unix_seconds(text):
+    return float(read_times([text])[0][0])
 
 
 def parsed(text):

@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 
 import mapfilter as mf
+from mapfilter.clocks.times import parse_times
 from mapfilter.errors import InputError
-from mapfilter.tracks.readers.clocks.times import parse_times
 
 TIMES = pd.Timestamp("2026-05-01 10:00:00") + pd.to_timedelta(range(60), unit="s")
 LAT, LON = 60.0, 25.0

@@ -5,10 +5,12 @@ import pandas as pd
 import pytest
 
 import mapfilter as mf
+from mapfilter._words import number_of
 from mapfilter.errors import InputError
 from mapfilter.geodesy import unproject
 from mapfilter.tracks.joining.recordings import read_recordings
 from mapfilter.tracks.open_options import OpenOptions
+from mapfilter.tracks.readers.formats import read_recording
 
 TIME_S = 1_777_629_600 + np.arange(60)
 
@@ -72,12 +74,23 @@ def test_a_file_with_none_of_the_columns_is_no_plain_table(files, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["walk.jsonl", "walk.json", "walk.log"])
-@pytest.mark.parametrize("start", ['{"time": 1.0, "steps": 2}', '[{"time": 1.0, "step_m": 0.7},'])
+@pytest.mark.parametrize("start", ['{"time": 1.0, "note": 2}', '[{"time": 1.0, "note": 0.7},'])
 def test_json_is_named(tmp_path, name, start):
     """Its keys were read as a header: a time that is none, or columns that are not used."""
     (tmp_path / name).write_text(f"{start}\n" * 3)
-    with pytest.raises(InputError, match=r"begins with .* \(likely: JSON; export GPX, or a table"):
+    with pytest.raises(InputError, match=r"begins with .* \(likely: JSON without records of"):
         mf.read_log(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", ["walk.jsonl", "walk.json", "walk.log"])
+@pytest.mark.parametrize(
+    ("start", "rows"), [('{"time": 1.0, "steps": 2}', 3), ('[{"time": 1.0, "step_m": 0.7},', 1)]
+)
+def test_json_of_motion_is_read(tmp_path, name, start, rows):
+    (tmp_path / name).write_text(f"{start}\n" * 3)
+    found = read_recording(tmp_path / name)
+    assert any(f"JSON read as a table of {number_of(rows, 'row')}" in one for one in found.notes)
+    assert {"steps", "motion"} & set(found.tables)
 
 
 @pytest.mark.parametrize(
@@ -86,10 +99,10 @@ def test_json_is_named(tmp_path, name, start):
         (
             "ride.tcx",
             b'<?xml version="1.0"?>\n<TrainingCenterDatabase/>\n',
-            "a TCX file; export GPX",
+            "recorded indoors, or an activity without a track",
         ),
         ("flight.igc", b"AXXXABC\nHFDTE010526\n", "an IGC file; export GPX"),
-        ("survey.gpkg", b"SQLite format 3\0\x10\0", "a GeoPackage; export its tables as CSV"),
+        ("survey.gpkg", b"SQLite format 3\0\x10\0", "no GeoPackage; export its table as CSV"),
         ("car.ubx", b"\xb5b\x01\x07\x5c\n\0\0" * 9, "u-blox receiver; export NMEA, or RINEX"),
     ],
 )

@@ -117,3 +117,10 @@ def test_hemispheres_of_gga(read):
     assert signs == [[1, 1], [-1, 1], [1, -1], [-1, -1]]
     assert np.abs(places["lat_deg"].to_numpy()[:4]) == pytest.approx(33.51)
     assert np.abs(places["lon_deg"].to_numpy()[:4]) == pytest.approx(70.99)
+
+
+def test_sentences_with_cells_are_noted(read):
+    """They were left out without a word; those of makers are of the receiver."""
+    lines = [rmc(), "$PCELL,LTE,244,91,3021,12345678,-80", "$PUBX,00,x"]
+    (note,) = read(lines).notes
+    assert note.startswith("1 sentence, perhaps of cells, not used: $PCELL (write them as CSV")

@@ -94,7 +94,13 @@ def test_nanoseconds_of_a_receiver_are_added_to_its_rounded_seconds():
         ((*PARTS, "itow", "nano"), ("", "", "", "time (utc)", "", "", "", "")),
         ((*PARTS, "nano"), ("", "", "", "time", "", "", "nano")),
         # One lacks, one is there twice, or there are other times.
-        (PARTS[:5], PARTS[:5]),
+        (PARTS[:4], PARTS[:4]),
+        # Without seconds times are whole minutes; days may be those of the year.
+        (PARTS[:5], ("", "", "", "time", "")),
+        (("date", "hour", "min", "lat"), ("", "time", "", "lat")),
+        (("year", "doy", "sod", "lat"), ("", "", "time (utc)", "lat")),
+        (("year", "doy", *PARTS[3:]), ("", "", "time", "", "")),
+        (("doy", "sod"), ("doy", "sod")),
         ((*PARTS, "year"), (*PARTS, "year")),
         ((*PARTS, "timestamp"), (*PARTS, "timestamp")),
         ((*PARTS, "time [ms]"), (*PARTS, "time [ms]")),
@@ -103,7 +109,7 @@ def test_nanoseconds_of_a_receiver_are_added_to_its_rounded_seconds():
 def test_which_names_are_parts_of_a_time(names, found):
     assert of_parts(names) == found
     # A column that a user names for a field is no part.
-    assert of_parts(names, {"year"}) == names
+    assert of_parts(names, {names[0]}) == names
     rows = columns(**{name: [1] for name in names})
     if len(set(names)) == len(names):
         assert (parts_of_dates(rows) is rows) == (found == names)

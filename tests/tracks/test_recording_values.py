@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from made_recordings import COUNT, LEVEL_DBM, MADE, gnettrack
 from made_satellites import nmea, sentence
 
+from mapfilter.clocks.times import parse_times
 from mapfilter.errors import InputError
 from mapfilter.tracks.joining.combine import combine
-from mapfilter.tracks.readers.clocks.times import parse_times
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.readers.recorded.recorded_values import duplicates

@@ -95,6 +95,7 @@ ALIKE = {
     ("towercollector", "opencellid"), ("opencellid", "towercollector"),
     ("opencellid-cells", "opencellid"),
     ("csv", "towercollector"), ("csv", "opencellid"), ("csv", "phyphox"),
+    ("csv", "gnettrack"),
 }  # fmt: skip
 
 

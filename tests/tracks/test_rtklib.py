@@ -59,3 +59,20 @@ def test_positions_that_are_no_decimal_degrees_are_refused(tmp_path, names):
     given = TEXT.replace("latitude(deg) longitude(deg)", names)
     with pytest.raises(InputError, match=r"decimal degrees \(solution format"):
         read(tmp_path, given)
+
+
+def test_degrees_minutes_and_seconds(tmp_path):
+    """They were refused."""
+    head, rows = TEXT.split("latitude(deg) longitude(deg)")
+    title, rows = rows.split("vu(m/s)\n")
+    lines = []
+    for line in rows.splitlines():
+        date, clock, _, _, *rest = line.split()
+        lines.append(" ".join([date, clock, "60", "10", "12.6", "-0", "30", "36.0", *rest]))
+    names = "latitude(d'\") longitude(d'\")"
+    found = read(tmp_path, head + names + title + "vu(m/s)\n" + "\n".join(lines))
+    positions = found.tables["positions"]
+    assert positions["lat_deg"].to_numpy() == pytest.approx(60 + 10 / 60 + 12.6 / 3600)
+    assert positions["lon_deg"].to_numpy() == pytest.approx(-0.51)
+    assert positions["accuracy_m"].to_numpy() == pytest.approx(1.515 * 5**0.5)
+    assert positions["speed_mps"].to_numpy() == pytest.approx(2.2)

@@ -8,10 +8,10 @@ import pandas as pd
 import pytest
 
 import mapfilter as mf
+from mapfilter.clocks.local_times import utc_from_local_s
+from mapfilter.clocks.times import parse_times
 from mapfilter.errors import InputError
 from mapfilter.tracks.readers import gpx
-from mapfilter.tracks.readers.clocks.local_times import utc_from_local_s
-from mapfilter.tracks.readers.clocks.times import parse_times
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.readers.texts import lines, text
@@ -51,6 +51,8 @@ def test_the_first_pass_where_nothing_tells():
 
 PARTS = [(-1800, 600), (-1800, 3000), (-6000, 9000), (600, 6000), (3000, 4000)]
 """Begin and end of files; the last two begin within the second pass."""
+STEP_S = 3.0
+"""From row to row: fewer parts than of each second, and several within either pass still."""
 NO_PASS = "passes twice"
 
 
@@ -100,7 +102,7 @@ def exported(name, utc_s):
 def test_parts_of_large_drive_tests_follow_each_other(tmp_path, monkeypatch, name, begin_s, end_s):
     """Parts within the second pass were an hour early."""
     monkeypatch.setattr(text, "_PART_BYTES", 1 << 14)
-    utc_s = BACK_S + np.arange(begin_s, end_s)
+    utc_s = BACK_S + np.arange(begin_s, end_s, STEP_S)
     columns, separator = exported(name, utc_s)
     pd.DataFrame(columns).to_csv(tmp_path / "drive.txt", index=False, sep=separator)
     found = read_recording(tmp_path / "drive.txt", options=ReadOptions(zone=BERLIN))
@@ -133,7 +135,7 @@ def test_blocks_of_a_large_file_follow_each_other(tmp_path, monkeypatch, name, b
     """Blocks within the second pass were an hour early."""
     monkeypatch.setattr(lines, "_BLOCK_BYTES", 1 << 14)
     monkeypatch.setattr(gpx, "_PART_BYTES", 1 << 14)
-    utc_s = BACK_S + np.arange(begin_s, end_s)
+    utc_s = BACK_S + np.arange(begin_s, end_s, STEP_S)
     path = tmp_path / f"drive.{name}"
     path.write_text("\n".join(written_in_blocks(name, utc_s)) + "\n")
     found = read_recording(path, options=ReadOptions(zone=BERLIN))

@@ -7,15 +7,14 @@ import pandas as pd
 import pyarrow as pa
 import pytest
 
-from mapfilter.errors import ConfigError
-from mapfilter.tracks.readers.clocks.local_times import (
+from mapfilter.clocks.local_times import (
     change_notes,
     is_beside_change,
     parse_zone,
     utc_from_local_s,
 )
-from mapfilter.tracks.readers.clocks.plain_times import plain_times
-from mapfilter.tracks.readers.clocks.times import (
+from mapfilter.clocks.plain_times import plain_times
+from mapfilter.clocks.times import (
     are_days,
     in_days,
     parse_times,
@@ -25,6 +24,7 @@ from mapfilter.tracks.readers.clocks.times import (
     utc_from_week_s,
     without_midnights,
 )
+from mapfilter.errors import ConfigError
 from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.readers.nmea_stamps import _stamp_s, stamped_dates
 

@@ -6,8 +6,10 @@ import pytest
 
 import mapfilter as mf
 from mapfilter.errors import InputError
+from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.readers.texts import text
 
+DAY_S = 86_400.0
 START_S = pd.Timestamp("2026-05-13T10:00:58Z").timestamp()
 
 
@@ -34,6 +36,18 @@ def read(tmp_path, header, times, zone="+00:00"):
         "Wed May 13 2026 {} GMT+0000 (Coordinated Universal Time)",
         "2026-05-13T{}+00:00[Europe/London]",
         "2026-05-13T{}+00:00[Etc/GMT+0]",
+        "13/05/26 {}",
+        "05/13/26 {}",
+        "13-05-26 {}",
+        "13.05.26 {}",
+        "2026.05.13 {}",
+        "2026.05.13_{}",
+        "2026-05-13_{}",
+        "20260513 {}",
+        "20260513-{}",
+        '"May 13, 2026, {} AM"',
+        "Wed May 13 {} WET 2026",
+        "2026-05-13 {} WET",
     ],
 )
 def test_dates_that_are_of_one_order_are_read(tmp_path, times):
@@ -140,3 +154,105 @@ def test_parts_of_a_file_have_one_order(tmp_path, monkeypatch):
     log = read(tmp_path, "date,time", unclear)
     assert np.isnan(log.start_utc_s)
     assert np.ptp(log.gnss["time_s"]) < 86_400
+
+
+@pytest.mark.parametrize("clocks", [("10.00.58", "10.00.59"), ("10-00-58", "10-00-59")])
+def test_times_as_names_of_files_have_them(tmp_path, clocks):
+    for date in ("2026.05.13_{}", "2026-05-13_{}", "2026-05-13 {}"):
+        log = read(tmp_path, "time", [date.format(one) for one in clocks])
+        assert log.start_utc_s == START_S, date
+
+
+@pytest.mark.parametrize(
+    "unclear",
+    [
+        ["11/05/26 10:00:00"],  # the 11th of May, of 2026, or the 5th of November
+        ["20/05/26 10:00:00"],  # 2026, or 2020-05-26
+        ["13/05/26 10:00:00", "05/13/26 10:00:00"],
+        ["13/05/99 10:00:00"],
+    ],
+)
+def test_short_years_that_may_be_read_in_several_orders_are_refused(tmp_path, unclear):
+    with pytest.raises(InputError, match="the day, the month, the year\\? Write 2026-05-13"):
+        read(tmp_path, "time", unclear)
+
+
+def test_a_guess_of_the_order_is_noted(tmp_path):
+    log = read(tmp_path, "time", ["13/05/26 10:00:00", "13/05/26 10:00:01"])
+    assert any("the day first in dates with a short year" in note for note in log.notes)
+    # Numbers of a single digit have no short year before them.
+    log = read(tmp_path, "time", ["13/5/26 23:59:59", "14/5/26 00:00:00"])
+    assert log.gnss["time_s"].tolist() == [0.0, 1.0]
+
+
+def test_dates_and_minutes_without_separators(tmp_path):
+    """They were taken for milliseconds since a phone was started."""
+    log = read(tmp_path, "time", ["202605131000", "202605131001", "202605131100"])
+    assert log.start_utc_s == START_S - 58
+    assert log.gnss["time_s"].tolist() == [0.0, 60.0, 3600.0]
+
+
+def test_names_of_zones_that_have_one_offset_are_read(tmp_path):
+    """They were refused, without a remedy."""
+    log = read(tmp_path, "time", ["2026-05-13 12:00:58 CEST", "2026-05-13 12:00:59 CEST"], zone="")
+    assert log.start_utc_s == START_S
+    assert any("CEST taken for UTC+02:00" in note for note in log.notes)
+    log = read(tmp_path, "time", ["2026-10-25 02:59:59 CEST", "2026-10-25 02:00:00 CET"], zone="")
+    assert log.gnss["time_s"].tolist() == [0.0, 1.0]
+    log = read(tmp_path, "time", ["Wed May 13 12:00:58 CEST 2026"], zone="")
+    assert log.start_utc_s == START_S
+
+
+def test_names_of_several_zones_are_those_of_the_zone_that_is_given(tmp_path):
+    times = ["2026-01-13 10:00:58 EST", "2026-01-13 10:00:59 EST"]
+    with pytest.raises(InputError, match="EST is of several zones; zone America/New_York"):
+        read(tmp_path, "time", times, zone="")
+    with pytest.raises(InputError, match="write the offset"):
+        read(tmp_path, "time", times, zone="Europe/Berlin")
+    log = read(tmp_path, "time", times, zone="America/New_York")
+    assert log.start_utc_s == pd.Timestamp("2026-01-13T15:00:58Z").timestamp()
+    with pytest.raises(InputError, match="XYZ is no known zone"):
+        read(tmp_path, "time", ["2026-01-13 10:00:58 XYZ"], zone="")
+
+
+@pytest.mark.parametrize(
+    ("header", "layout", "days"),
+    [
+        ("time", "{:02d}/05/2026 10:00:00", 27),
+        ("date,time", "{:02d}/05/2026,10:00:00", 27),
+        ("date,hour,min", "{:02d}/05/2026,10,00", 27),
+        ("time", "{:02d}/05/26 10:00:00", 15),
+    ],
+)
+def test_a_later_part_of_a_file_shows_the_order_of_dates(
+    tmp_path, monkeypatch, header, layout, days
+):
+    """A file whose first part has only days up to 12 was refused."""
+    monkeypatch.setattr(text, "_PART_BYTES", 100)
+    path = tmp_path / "drive.csv"
+    rows = [f"{layout.format(day)},60.1,24.{day}" for day in range(1, days + 1)]
+    path.write_text("\n".join([f"{header},lat,lon", *rows]) + "\n")
+    found = read_recording(path)
+    assert np.diff(found.tables["positions"]["time_s"]).tolist() == [DAY_S] * (days - 1)
+    assert sum("the day first in dates" in note for note in found.notes) == 1
+    path.write_text("\n".join([f"{header},lat,lon", *rows[:12]]) + "\n")
+    with pytest.raises(InputError, match=r"day or month first|which number is the day"):
+        read_recording(path)
+
+
+def test_a_date_with_hours_and_minutes_is_no_midnight(tmp_path):
+    """All rows had the time of midnight."""
+    log = read(tmp_path, "date,hour,min", ["2026-05-13,10,0", "2026-05-13,10,1"])
+    assert log.start_utc_s == START_S - 58
+    assert log.gnss["time_s"].tolist() == [0.0, 60.0]
+    assert any("whole minutes" in note for note in log.notes)
+
+
+def test_days_of_a_year_and_seconds_of_the_day(tmp_path):
+    """They were refused, as without times."""
+    log = read(tmp_path, "year,doy,sod", ["2026,133,36058.0", "2026,133,36058.5"], zone="")
+    assert log.start_utc_s == START_S
+    assert log.gnss["time_s"].tolist() == [0.0, 0.5]
+    assert any("if it is GPS time, 18 s ahead of it" in note for note in log.notes)
+    log = read(tmp_path, "year,doy,hour,min,sec", ["2026,133,10,0,58", "2026,134,0,0,0"])
+    assert log.start_utc_s == START_S

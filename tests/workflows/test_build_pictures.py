@@ -47,8 +47,9 @@ def build(world, out, *more):
     return mapfilter("build", "-c", world.toml, "--out", out, *given, *more, "--json")
 
 
-def test_a_build_draws_its_database(world, tmp_path):
-    built = assert_done(build(world, tmp_path, "--set=output.pictures=first")).json
+def test_a_build_draws_its_database(world, tmp_path, drawn_small):
+    with drawn_small():
+        built = assert_done(build(world, tmp_path, "--set=output.pictures=first")).json
     folder = tmp_path / "pictures"
     assert built["pictures"] == [str(folder / f"{name}.png") for name in EVERY]
     assert sorted(path.stem for path in folder.iterdir()) == sorted(EVERY)

@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -289,6 +290,7 @@ def test_a_replay_is_a_result_no_recording(tmp_path):
     shown = {name: FIGURES[name] for name in FIGURES if name not in ("unused", "notes")}
     for path, kind in (
         (folder, "replay"),
+        (folder / "figures.json", "replay"),
         (folder / "estimate.parquet", "estimate"),
         (folder / "estimate.gpx", "estimate"),
     ):
@@ -333,11 +335,13 @@ def test_several_replays_and_located_reports(tmp_path):
     found = info(tmp_path / "several")
     assert found.pop("use").startswith("what a filter estimated")
     assert found == {"kind": "replays", **figures}
+    assert info(tmp_path / "several" / "summary.json")["kind"] == "replays"
     (tmp_path / "reports").mkdir()
     (tmp_path / "reports" / "positions.csv").write_text("time_s,lat,lon\n0,60,24\n")
     (tmp_path / "reports" / "figures.json").write_text('{"database_reports": 9, "reports": 3}')
     found = info(tmp_path / "reports")
     assert (found["kind"], found["reports"]) == ("located reports", 3)
+    assert info(tmp_path / "reports" / "figures.json") == found
 
 
 def test_figures_of_another_program_are_no_results(tmp_path):
@@ -346,6 +350,36 @@ def test_figures_of_another_program_are_no_results(tmp_path):
     (tmp_path / "summary.json").write_text("[1, 2]")
     (tmp_path / "figures.json").write_text("no JSON")
     assert info(tmp_path)["kind"] == "recordings"
+
+
+def test_points_with_times_and_texts_of_cells_are_recordings(tmp_path):
+    """The former were streets only, the latter a table whose columns are its first line."""
+    at = {"type": "Point", "coordinates": [24.94, 60.17]}
+    point = {"type": "Feature", "properties": {"time": "2026-05-13T08:00:00Z"}, "geometry": at}
+    path = tmp_path / "drive.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": [point]}))
+    found = info(path)
+    assert (found["kind"], found["use"].rpartition("; ")[2]) == (
+        "layers",
+        "points with times: mapfilter replay --log, or mapfilter convert",
+    )
+    log = tmp_path / "log.txt"
+    log.write_text(
+        "05-13 11:00:00.123 1 1 D Own: [CellInfoLte:{CellIdentityLte:{ mCi=7, mPci=1}}]\n"
+    )
+    assert_refused(mapfilter("info", log), "a logcat without years")
+
+
+def test_a_zip_of_a_track_log_is_named_as_that(world, tmp_path):
+    """Offsets were asked for its tables, and its tables were no recordings."""
+    log = next(world.journeys.iterdir())
+    path = Path(shutil.make_archive(str(tmp_path / "walk"), "zip", log))
+    unpack = "a ZIP of a track log; unpack it, and name its folder"
+    assert_refused(mapfilter("info", path), unpack)
+    assert_refused(mapfilter("convert", path, "--out", tmp_path / "out"), unpack)
+    offset = mapfilter("convert", path, "--offset", "walk.zip=3", "--out", tmp_path / "out")
+    assert_refused(offset, "a track log has the times of its tables")
+    assert "parquet" not in offset.err
 
 
 @pytest.mark.parametrize(

@@ -35,6 +35,9 @@ _VEHICLE_MOTION: Mapping[str, float] = {
     "stretch_sd": 0.02,
     "corners_per_m": 1 / 20,
 }
+_RESCALES_PER_M, _RESCALED_BY_SCALE = 1 / 1000, 3.0
+"""How often a vehicle's step scale becomes another one over cells, as after a stop of a bus; and
+how far off it is then, as a multiple of the scale's own deviation."""
 _VEHICLE_LEAVES_PER_M = 3e-4
 _VEHICLE_FIX_MEMORY_S = 14.0
 """Time in which a walker goes the distance for which errors of fixes last; cars have it too."""
@@ -62,7 +65,7 @@ def assembled(options: BayesFilter, area: AreaFrame) -> BayesPositioner:
         use_levels=options.levels,
     )
     threads = Threads(options.threads)
-    motion, weights = _motion_errors(options), _map_weights(options)
+    motion, weights = _motion_errors(options, area), _map_weights(options)
     model = BayesModel(area, motion, weights, evidence=evidence, threads=threads)
     particles, rules = _particle_options(options), AlternativeRules()
     rules = replace(rules, claimed_from=min(rules.claimed_from, options.switch_mass))
@@ -95,7 +98,7 @@ def assembled(options: BayesFilter, area: AreaFrame) -> BayesPositioner:
     )
 
 
-def _motion_errors(options: BayesFilter) -> MotionErrors:
+def _motion_errors(options: BayesFilter, area: AreaFrame) -> MotionErrors:
     motion = MotionErrors(
         step_sd_m=options.step_sd_m,
         heading_sd_rad=radians(options.heading_sd_deg),
@@ -104,7 +107,12 @@ def _motion_errors(options: BayesFilter) -> MotionErrors:
         scale_sd=options.scale,
     )
     if options.vehicle:
-        return replace(motion, **_VEHICLE_MOTION)
+        motion = replace(motion, **_VEHICLE_MOTION)
+        if not area.cell_ids:
+            # Streets alone would follow any scale.
+            return motion
+        rescaled_sd = _RESCALED_BY_SCALE * options.scale
+        return replace(motion, rescales_per_m=_RESCALES_PER_M, rescaled_sd=rescaled_sd)
     # Disturbances are part of the headings' errors: with small ones large jumps are rarer.
     usual = MotionErrors()
     times = motion.heading_sd_rad / usual.heading_sd_rad

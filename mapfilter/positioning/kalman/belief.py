@@ -75,6 +75,9 @@ class SumBelief:
     @cached_property
     def moments(self) -> Gaussian:
         """Mean and covariance of the whole."""
+        if self.weights.size == 1 and self.weights[0] == 1.0:
+            # A sum of one is itself; a sum has no negative zero.
+            return Gaussian(self.means[0] + 0.0, np.add(self.covariances[0], 0.0, order="C"))
         mean = self.weights @ self.means
         off = self.means - mean
         spread = self.covariances + off[:, :, None] * off[:, None, :]

@@ -127,9 +127,9 @@ class ComparedFix(NamedTuple):
     off_m: Floats
     predicted_m2: Floats
     stated_m2: Floats
-    rests: bool = False
-    is_doubted: bool = False
-    gone_m: float = 0.0
+    rests: bool
+    is_doubted: bool
+    gone_m: float
 
 
 class _Row(NamedTuple):
@@ -219,7 +219,7 @@ class FixRecord(EqualByValue):
         if fix.is_doubted:
             return replace(self, agreed=0, rows=()), FixVerdict(Ruling.EITHER, squared / 2)
         if self.agreed < _YOUNG:
-            return self._anew(), FixVerdict(Ruling.EITHER, squared / 2)
+            return self.anew(), FixVerdict(Ruling.EITHER, squared / 2)
         variance_m2 = max(float(np.trace(noise_m2)) / 2, LEAST_FIX_SD_M**2)
         rows = (*self.rows, _Row(time_s, float(off_m[0]), float(off_m[1]), variance_m2, gone_m))
         patience_s = patience.usual_s
@@ -233,7 +233,7 @@ class FixRecord(EqualByValue):
         ruling = _ruling(np.array(rows), patience_s, rests=fix.rests)
         if ruling.begins:
             drifted = ruling is Ruling.ANEW and not jumped
-            return self._anew(), FixVerdict(ruling, squared / 2, drifted=drifted)
+            return self.anew(), FixVerdict(ruling, squared / 2, drifted=drifted)
         # So much larger that the fix is at the limit along the way to it.
         along = off_m / hypot(*off_m)
         own_m2 = float(along @ noise_m2 @ along)
@@ -242,7 +242,8 @@ class FixRecord(EqualByValue):
         after = replace(self, rows=rows, is_over=False)
         return after, FixVerdict(ruling, squared / 2, larger)
 
-    def _anew(self) -> FixRecord:
+    def anew(self) -> FixRecord:
+        """Return it where the belief begins anew."""
         return FixRecord(self.excess, begun=self.begun + 1)
 
 

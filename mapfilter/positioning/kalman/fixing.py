@@ -17,8 +17,10 @@ from mapfilter.models.state import MOVING, StateLayout
 from mapfilter.positioning.epochs import GnssFix
 from mapfilter.positioning.gnss.wander import FixWander
 from mapfilter.positioning.kalman.belief import SumBelief
+from mapfilter.positioning.kalman.coasting import Coasting
 from mapfilter.positioning.kalman.disputed import (
     ComparedFix,
+    FixRecord,
     FixVerdict,
     Patience,
     Ruling,
@@ -35,6 +37,11 @@ _RECKONED, _MOVING = Patience(30.0, 120.0), Patience(5.0, 5.0)
 """With dead reckoning, and where but a velocity is known."""
 _UNSEEN_S = 20.0
 """Time without a fix after which one that contradicts the belief is as likely to be right."""
+_SETTLED, _DOUBTFUL = 10, 60
+"""Fixes that agreed with a belief, from which on it goes on without them, too; of one in doubt."""
+_RETURNED = 3
+"""Fixes in a row that contradict a belief, and agree with one that is older than what it has
+followed, from which on they are right."""
 _FREER_MPS_PER_SQRT_S = 4.0
 """Random walk of the speed of a vehicle that brakes and turns: some 1.3 m/s² for 5 s."""
 _SHARE = 0.5
@@ -126,6 +133,7 @@ class FixWeighing:
         """
         own, record, rests = self.own, errors.record, isfinite(rests_since_s)
         stated = fix_covariance_m2(fix, self.options.fix_sd_m)
+        place_m = np.array([fix.east_m, fix.north_m])
         noise = stated * errors.understated
         motion, layout, white, lasting_m = at_rest(self.layout), self.layout, noise, 0.0
         wanted_m = 0.0
@@ -152,13 +160,37 @@ class FixWeighing:
                     time_s,
                     off_m,
                     moments.covariance[np.ix_(where, where)],
-                    stated,
+                    stated * errors.coasting.times,
                     rests,
                     is_doubted or time_s - errors.fixed_s > _UNSEEN_S,
                     errors.gone_m,
                 ),
                 _MOVING if own is MOVING else _RECKONED,
             )
+            # Steps that say rest, or that may be missing, contradict nothing.
+            if own is not MOVING and not rests and not is_doubted:
+                coasting, given = errors.coasting, (time_s, place_m, stated)
+                if found.ruling in (Ruling.AGREES, Ruling.EITHER):
+                    own_belief, since_s = self._own(belief), time_s - errors.fixed_s
+                    coasting = coasting.compared(*given, own_belief, since_s)
+                else:
+                    coasting = coasting.again(*given)
+                if coasting.is_back and found.ruling is Ruling.AGREES:
+                    # They have come back by and by: errors that change, and no spoofer.
+                    coasting = coasting.broken_off()
+                elif coasting.is_back and len(record.rows) != 1:
+                    if coasting.is_known(place_m, stated, moments.mean[where]):
+                        onto = self._regained(coasting, lasting_m)
+                        belief, motion = belief.predict(*onto), after_each_other(motion, onto)
+                        record, found = FixRecord(), FixVerdict(Ruling.AGREES, nan)
+                        errors = errors._replace(wander=FixWander(), doubt=Doubt.NONE)
+                    elif len(record.rows) >= _RETURNED:
+                        record, found = record.anew(), FixVerdict(Ruling.ANEW, found.squared)
+                    if found.ruling is not Ruling.OUTLIER:
+                        coasting = coasting.regained()
+                errors = errors._replace(coasting=coasting)
+            elif found.ruling.begins:
+                errors = errors._replace(coasting=errors.coasting.begun_anew())
             if found.ruling.begins:
                 white = white_part(noise, wanted_m) if self._lasts else noise
                 # Of two places that are as likely as each other the middle, out to both.
@@ -169,6 +201,9 @@ class FixWeighing:
                 errors = errors.after_fix(wanted_m, record, time_s)._replace(wander=FixWander())
                 if found.ruling is Ruling.ANEW and own is not MOVING:
                     errors = errors._replace(doubt=Doubt.UNTIL_PROVEN)
+                led = found.drifted or found.ruling is Ruling.EITHER
+                if not led and found.ruling is not Ruling.CARRIED:
+                    errors = errors._replace(coasting=errors.coasting.broken_off())
                 belief = belief.predict(*motion)
                 return WeighedFix(
                     belief, errors, motion, found.ruling, nan, True, drifted=found.drifted
@@ -194,7 +229,36 @@ class FixWeighing:
             turns = float(belief.moments.mean[RATE]), radians(drift_deg_per_sqrt_m)
             errors = errors.wandered(fix, float(np.trace(stated)) / 2, time_s, turns)
         errors = errors.proven(time_s, self.options.fix_lasting_s)
+        if self._coasts(errors) and not rests:
+            seen_m = belief.moments.mean[self._places[-1]] if self._lasts else place_m
+            coasting = errors.coasting.after_fix(time_s, seen_m, stated, self._own(belief))
+            errors = errors._replace(coasting=coasting)
         return WeighedFix(belief, errors, motion, found.ruling, nis, info.used)
+
+    def _coasts(self, errors: FixErrors) -> bool:
+        """Return whether a belief is settled, and dead reckoning would go on with it alone."""
+        needed = _SETTLED if errors.doubt is Doubt.NONE else _DOUBTFUL
+        return self.own is not MOVING and errors.record.agreed >= needed
+
+    def _own(self, belief: SumBelief) -> Gaussian:
+        """Return a belief without what is behind position and errors of dead reckoning."""
+        moments, size = belief.moments, self.own.size
+        return Gaussian(moments.mean[:size], moments.covariance[:size, :size])
+
+    def _regained(self, coasting: Coasting, lasting_m: float) -> Motion:
+        """Return the motion to a belief without the last fixes, whose errors are unknown again."""
+        coast, size = coasting.apart.coast, self.own.size
+        if coast is None:
+            raise AssertionError("regains with a belief")
+        transition, noise, shift = at_rest(self.layout)
+        both = list(range(size)) + (self._places[1] if self._lasts else [])
+        of = np.eye(size)[[*range(size), *self._places[0][: len(both) - size]]]
+        transition[both] = 0.0
+        shift[both] = of @ coast.mean
+        noise[np.ix_(both, both)] = of @ coast.covariance @ of.T
+        if self._lasts:
+            noise[self._places[1], self._places[1]] += lasting_m**2
+        return transition, noise, shift
 
     def _freer(
         self, moments: Gaussian, off_m: Floats, noise_m2: Floats, elapsed_s: float

@@ -12,6 +12,7 @@ from mapfilter._types import Floats
 from mapfilter.filters.gaussian import Gaussian
 from mapfilter.positioning.gaussian_tail import GaussianTail
 from mapfilter.positioning.kalman.belief import SumBelief
+from mapfilter.positioning.kalman.coasting import Separation
 
 WITHIN_M = 50.0
 """Distance from the position within which the share of a belief is reported."""
@@ -39,10 +40,32 @@ def place_of(belief: Gaussian, where: list[int]) -> dict[str, Any]:
     }
 
 
-def belief_tail(belief: SumBelief, where: list[int]) -> GaussianTail:
-    """Return the tail of a Gaussian sum about its mean; ``where`` are east and north."""
-    offsets_m = belief.means[:, where] - belief.moments.mean[where]
-    return GaussianTail(belief.weights, offsets_m, belief.covariances[:, where][:, :, where])
+def belief_tail(
+    belief: SumBelief, where: list[int], apart: Separation | None = None
+) -> GaussianTail:
+    """Return the tail of a Gaussian sum about its mean; ``where`` are east and north.
+
+    A belief without fixes beside it is a further part.
+    """
+    weights, means = belief.weights, belief.means[:, where]
+    covariances_m2 = belief.covariances[:, where][:, :, where]
+    if apart is None or apart.coast is None:
+        return GaussianTail(weights, means - belief.moments.mean[where], covariances_m2)
+    weights = np.append((1 - apart.probability) * weights, apart.probability)
+    means = np.vstack([means, apart.coast.mean[:2]]) - belief.moments.mean[where]
+    covariances_m2 = np.concatenate([covariances_m2, apart.coast.covariance[None, :2, :2]])
+    return GaussianTail(weights, means, covariances_m2)
+
+
+def spread_of(tail: GaussianTail) -> dict[str, Any]:
+    """Return what is reported of the parts of a tail about a position, as fields of a fix."""
+    off_m = tail.offsets_m
+    moments_m2 = tail.covariances_m2 + off_m[:, :, None] * off_m[:, None, :]
+    return {
+        "covariance_m2": np.einsum("c,cij->ij", tail.weights, moments_m2),
+        "radii_m": np.array([tail.radius_m(share) for share in _SHARES.tolist()]),
+        "mass_50m": 1 - tail.outside(WITHIN_M),
+    }
 
 
 def mixture_radii_m(belief: SumBelief, where: list[int]) -> Floats:

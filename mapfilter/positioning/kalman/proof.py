@@ -65,14 +65,15 @@ def way_agrees(rows: tuple[WanderFix, ...], understated: float, lasting_s: float
         given.append(WayFix(one.time_s, *place, *noise, 0.0, 0.0, one.sd_m))
     found = Stretches.of(np.array(given), lasting_s)
     sd = float(found.sd_rad[0])
-    known, usual = _DRIVEN if _usual_mps(rows) > WALKERS_MPS else _WALKED
+    known, usual = _DRIVEN if usual_mps(rows) > WALKERS_MPS else _WALKED
     if sd > known:
         return None
     drawn_out = abs(float(np.abs(found.factor[0])) - 1)
     return bool(found.fits[0]) and drawn_out <= usual + _DEVIATIONS * sd
 
 
-def _usual_mps(rows: tuple[WanderFix, ...]) -> float:
+def usual_mps(rows: tuple[WanderFix, ...]) -> float:
+    """Return the mean speed by steps over some fixes."""
     gone_m = sum(
         hypot(after.way_east_m - one.way_east_m, after.way_north_m - one.way_north_m)
         for one, after in pairwise(rows)

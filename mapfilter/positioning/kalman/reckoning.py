@@ -42,6 +42,7 @@ the rate of turns in rad/s."""
 ERRORS = slice(2, 5)
 """Components that are errors of dead reckoning."""
 TURNED, _SCALE, RATE, _LEAST = 2, 3, 4, 1e-6
+_PLANE = np.eye(2)
 _TURNS_SD_RAD = radians(2.0)
 """White error of headings that turns add up to, at most: a compass is read again and again, among
 iron."""
@@ -233,7 +234,7 @@ class Reckoning(EqualByValue):
             if not isfinite(step.spread_m):
                 step, why = headless_step(step.step_m, self.headless_m), Reason.NO_HEADING
                 after = replace(after, headless_m=self.headless_m + abs(step.step_m))
-            noise[:2, :2] = step.all_sides_m**2 / 2 * np.eye(2)
+            noise[:2, :2] = step.all_sides_m**2 / 2 * _PLANE
             if alignment.known:
                 noise[TURNED, TURNED] += step.turned_sd_rad**2
             return after, (transition, noise, shift), why
@@ -241,14 +242,14 @@ class Reckoning(EqualByValue):
         heading_rad, length_m = step.heading_rad + turned_rad, step.step_m * (1 + scale)
         along = np.array([cos(heading_rad), sin(heading_rad)])
         across = np.array([-along[1], along[0]])
-        transition[:2, 2:] = np.outer(length_m * across, transition[TURNED, 2:])
+        transition[:2, 2:] = (length_m * across)[:, None] * transition[TURNED, 2:]
         transition[:2, _SCALE] = step.step_m * along
         shift[:2] = length_m * along - transition[:2, 2:] @ errors
         white_rad = radians(options.heading_sd_deg)
         cross_m = step.step_m * (min(white_rad, _TURNS_SD_RAD) if by_turns else white_rad)
-        noise[:2, :2] = step.rows * options.step_sd_m**2 * np.outer(along, along)
-        noise[:2, :2] += step.sampling_sd_m**2 * np.eye(2) if step.step_m != 0 else 0.0
-        noise[:2, :2] += cross_m**2 / step.rows * np.outer(across, across)
+        noise[:2, :2] = step.rows * options.step_sd_m**2 * (along[:, None] * along)
+        noise[:2, :2] += step.sampling_sd_m**2 * _PLANE if step.step_m != 0 else 0.0
+        noise[:2, :2] += cross_m**2 / step.rows * (across[:, None] * across)
         if self.headless_m or self.before_m or self.origin is not None:
             after = replace(after, headless_m=0.0, before_m=0.0, origin=None)
         return after, (transition, noise, shift), Reason.USED

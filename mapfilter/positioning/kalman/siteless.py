@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from mapfilter._words import counted
+from mapfilter._words import number_of
 from mapfilter.tracks.log import TrackLog
 
-_OF_SITES = {"radio": "rows of cells (radio)", "tdoa": "time differences (tdoa)"}
-"""Tables of which sites make measurements, and what their rows are called."""
+_OF_SITES = {
+    "radio": ("row of cells (radio)", "rows of cells (radio)"),
+    "tdoa": ("time difference (tdoa)", "time differences (tdoa)"),
+}
+"""Tables of which sites make measurements, and what one of their rows is called, and several."""
 
 
 def needs_sites(log: TrackLog) -> bool:
@@ -37,7 +40,7 @@ def without_cells(log: TrackLog, sources: str) -> TrackLog:
     (0, ('2 rows of cells (radio) left out: their sites are unknown without a plan',))
     """
     rows = {table: getattr(log, table) for table in _OF_SITES}
-    found = [counted(len(rows[table]), _OF_SITES[table]) for table in rows if len(rows[table])]
+    found = [number_of(len(one), *_OF_SITES[table]) for table, one in rows.items() if len(one)]
     if not found:
         return log
     note = f"{' and '.join(found)} left out: their sites are unknown without {sources}"

@@ -28,6 +28,7 @@ from mapfilter.positioning.kalman.place import (
     mixture_radii_m,
     place_of,
     share_within,
+    spread_of,
 )
 from mapfilter.positioning.kalman.proof import Doubt
 from mapfilter.positioning.kalman.readings import SiteReadings, fix_covariance_m2, site_readings
@@ -90,7 +91,9 @@ class KalmanStep:
     @property
     def tail(self) -> GaussianTail | None:
         """The belief's tail about its mean."""
-        return None if self.belief is None else belief_tail(self.belief, self.where)
+        if self.belief is None:
+            return None
+        return belief_tail(self.belief, self.where, self.fixes.coasting.apart)
 
     def take(self, epoch: Epoch) -> Fix:
         """Move, then measure; return the epoch's fix."""
@@ -114,7 +117,7 @@ class KalmanStep:
         self.moved_m += moved_m
         options = self.options
         if self.lasts:
-            lasting = self.fixes.lasting_m, options.fix_lasting_s
+            lasting = self.fixes.lasting_m, self.fixes.lasting_s(options.fix_lasting_s)
             motion = extended_motion(motion, self.own, *lasting, elapsed_s)
         if self.slots.size:
             self.slots, self.growth, renewed = self.slots.after_report(
@@ -154,6 +157,7 @@ class KalmanStep:
             after = motion[0] @ mean + motion[2]
             gone = complex(*(after - mean)[self.where]) * exp(-1j * after[TURNED])
             self.fixes = self.fixes.moved(gone.real, gone.imag, gaps)
+        self.fixes = self.fixes.coasted(motion, moments.mean[: self.own.size])
         return motion, moved_m
 
     def _speed_mps(self) -> float:
@@ -237,6 +241,7 @@ class KalmanStep:
             self.belief, motion = self.belief.predict(*doubt), after_each_other(motion, doubt)
         if self.own is RECKONED and isinstance(found, Direction):
             turned = turned_to(found, layout)
+            self.fixes = self.fixes._replace(coasting=self.fixes.coasting.begun_anew())
             self.belief, motion = self.belief.predict(*turned), after_each_other(motion, turned)
         if self.motion is not None:
             self.motion = after_each_other(self.motion, motion)
@@ -283,8 +288,15 @@ class KalmanStep:
         place = place_of(self.belief.moments, self.where)
         # Parts far from the mean count by their variance, so that a claim waits for them.
         self._set_status(float(place["radii_m"][2]))
-        count = self.belief.weights.size
-        if count > 1:
+        count, apart = self.belief.weights.size, self.fixes.coasting.apart
+        if apart.coast is not None:
+            here_m = self.belief.moments.mean[self.where]
+            if self.status in (Status.CONVERGED, Status.TRACKING) and apart.leaves_too_little(
+                here_m
+            ):
+                self.status = Status.UNCERTAIN
+            place |= spread_of(belief_tail(self.belief, self.where, apart))
+        elif count > 1:
             lead = self.belief.leading.covariance[np.ix_(self.where, self.where)]
             place["mass_50m"] = share_within(lead, WITHIN_M) * float(self.belief.weights.max())
             place["radii_m"] = mixture_radii_m(self.belief, self.where)

@@ -10,6 +10,7 @@ import pandas as pd
 
 from mapfilter._constants import DAY_S
 from mapfilter._types import Floats
+from mapfilter.clocks.times import are_days
 from mapfilter.errors import Faults
 from mapfilter.lattice import Lattice
 from mapfilter.tracks.checks.clock_notes import week_fault
@@ -17,7 +18,6 @@ from mapfilter.tracks.checks.exchanged import sideways_mps2
 from mapfilter.tracks.checks.misplaced import FAR_M, misplaced_by
 from mapfilter.tracks.checks.second_deliveries import once_each
 from mapfilter.tracks.joining.moved import UNDIRECTED
-from mapfilter.tracks.readers.clocks.times import are_days
 
 # Tables may begin this long after another ends.
 _APART_S = 600.0
@@ -115,6 +115,8 @@ def truth_far_off(crs: str, tables: Mapping[str, pd.DataFrame]) -> tuple[str, ..
     crs : str
         That of the positions.
     """
+    if min(len(tables[name]) for name in ("truth", "gnss")) < _FEW_ROWS:
+        return ()
     truth, fixes = (tables[name].drop_duplicates("time_s") for name in ("truth", "gnss"))
     inside = fixes[fixes["time_s"].between(truth["time_s"].min(), truth["time_s"].max())]
     if len(truth) < _FEW_ROWS or len(inside) < _FEW_ROWS:
@@ -202,8 +204,8 @@ def _milliseconds(times: Mapping[str, Floats]) -> str:
 def check_steps(tables: Mapping[str, pd.DataFrame], where: str, faults: Faults) -> tuple[str, ...]:
     """Note steps that are cumulative, backwards or in another unit; return notes on odd ones."""
     motion = once_each(tables["motion"])
-    motion = motion[np.isfinite(motion["step_m"].to_numpy())]
     time_s, step_m = motion["time_s"].to_numpy(), motion["step_m"].to_numpy()
+    time_s, step_m = time_s[np.isfinite(step_m)], step_m[np.isfinite(step_m)]
     if len(step_m) < _FEW_ROWS:
         return ()
     lasted_s, moved_m = float(np.ptp(time_s)), float(np.abs(step_m).sum())
@@ -283,9 +285,13 @@ def undirected_note(motion: pd.DataFrame, where: str) -> tuple[str, ...]:
 
 def _extent_m(tables: Mapping[str, pd.DataFrame], first_s: float, last_s: float) -> float:
     """Return how far apart true positions or fixes lie within some time."""
-    every = (tables[table] for table in ("truth", "gnss"))
-    within = (places[places["time_s"].between(first_s, last_s)] for places in every)
-    extents = (np.hypot(np.ptp(p["east_m"]), np.ptp(p["north_m"])) for p in within if len(p))
-    # Infinite places are a fault of their own.
-    with np.errstate(invalid="ignore", over="ignore"):
-        return float(max(extents, default=0.0))
+    extents = []
+    for places in (tables[table] for table in ("truth", "gnss")):
+        time_s = places["time_s"].to_numpy()
+        within = (time_s >= first_s) & (time_s <= last_s)
+        if within.any():
+            # Infinite places are a fault of their own.
+            with np.errstate(invalid="ignore", over="ignore"):
+                axes_m = (np.ptp(places[name].to_numpy()[within]) for name in ("east_m", "north_m"))
+                extents.append(float(np.hypot(*axes_m)))
+    return max(extents, default=0.0)

@@ -125,14 +125,11 @@ def step_fault(
     >>> step_fault(motion, truth) is None
     True
     """
-    time_s, step_m = motion_values(motion, "time_s"), steady_values(motion, "step_m")
-    ways = stretches(places, time_s, np.cumsum(np.abs(step_m)))
-    if ways is None:
+    compared = _compared(motion, places)
+    if compared is None:
         return None
-    ways = ways.where(ways.grown(*_rests(time_s, step_m)).real <= _REST_SHARE * ways.lasted_s)
-    ways, moved_m = _comparable(ways, motion)
-    distance_m = np.abs(ways.before_m + ways.after_m)
-    factor = np.abs(ways.grown(time_s, np.cumsum(moved_m))) / distance_m
+    ways, moved_m, distance_m, factor = compared
+    time_s = motion_values(motion, "time_s")
     typical = float(np.median(factor)) if factor.size >= _FEWEST else 1.0
     if _SHORTER <= typical <= _LONGER or typical <= 0:
         return None
@@ -147,7 +144,7 @@ def step_fault(
         named = {unit: f"speeds in {unit}, rows {apart_s:.2g} s apart" for unit in speeds}
         off |= {named[unit]: by for unit, by in speeds.items()}
         times |= {named[unit]: _SPEEDS[unit] / apart_s for unit in speeds}
-    if not (_is_constant(factor) or (speeds and _is_constant(of_speeds))):
+    if not (is_constant(factor) or (speeds and is_constant(of_speeds))):
         return None
     causes = sorted(off, key=off.__getitem__)[:_MOST_NAMED]
     found = found.format(f"{typical:.3g}")
@@ -155,6 +152,33 @@ def step_fault(
         return MotionFault("step_m", found, "metres")
     likely = " or ".join(causes)
     return MotionFault("step_m", f"{found} ({likely}?)", "metres", 1 / times[causes[0]])
+
+
+def step_factors(motion: pd.DataFrame, places: pd.DataFrame) -> Floats:
+    """Return how many times as long steps are as the ways between positions, some 100 m apart.
+
+    Parameters
+    ----------
+    motion, places : pandas.DataFrame
+        As of :func:`step_fault`.
+    """
+    compared = _compared(motion, places)
+    return np.zeros(0) if compared is None else compared[-1]
+
+
+def _compared(
+    motion: pd.DataFrame, places: pd.DataFrame
+) -> tuple[Stretches, Complexes, Floats, Floats] | None:
+    """Return ways, moves, the ways' distances, and how many times as long steps are; or None."""
+    time_s, step_m = motion_values(motion, "time_s"), steady_values(motion, "step_m")
+    ways = stretches(places, time_s, np.cumsum(np.abs(step_m)))
+    if ways is None:
+        return None
+    ways = ways.where(ways.grown(*_rests(time_s, step_m)).real <= _REST_SHARE * ways.lasted_s)
+    ways, moved_m = _comparable(ways, motion)
+    distance_m = np.abs(ways.before_m + ways.after_m)
+    factor = np.abs(ways.grown(time_s, np.cumsum(moved_m))) / distance_m
+    return ways, moved_m, distance_m, factor
 
 
 def _comparable(ways: Stretches, motion: pd.DataFrame) -> tuple[Stretches, Complexes]:
@@ -207,7 +231,7 @@ def _matching(units: Mapping[str, float], factor: Floats) -> dict[str, float]:
     return {word: by for word, by in off.items() if by <= np.log(_NAMED)}
 
 
-def _is_constant(factor: Floats) -> bool:
-    """Return whether most are within 20 % of the median."""
+def is_constant(factor: Floats) -> bool:
+    """Return whether most factors are within 20 % of the median."""
     near = np.abs(np.log(np.maximum(factor, 1e-9) / np.median(factor))) <= np.log(_ALIKE)
     return bool(np.mean(near) >= _MOSTLY)

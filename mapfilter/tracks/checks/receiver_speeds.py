@@ -11,6 +11,7 @@ from mapfilter.errors import InputError, fail
 from mapfilter.tracks.checks.headings import headings_and_courses
 from mapfilter.tracks.checks.motion_fault import MotionFault
 from mapfilter.tracks.checks.motion_faults import step_fault
+from mapfilter.tracks.checks.speed_labels import speed_label_fault
 from mapfilter.tracks.readers.recorded.recording import Recording
 
 _FEWEST = 20
@@ -46,7 +47,9 @@ def check_speeds(recording: Recording, east_m: Floats, north_m: Floats) -> tuple
         got = "speeds that are, as degrees, the course of the positions"
         hint = "the columns of speed and course are exchanged"
         raise fail(InputError, where, expected, got, hint)
-    fault = speed_unit_fault(known["time_s"], known["speed_mps"], places)
+    time_s, speed_mps = known["time_s"], known["speed_mps"]
+    fault = speed_label_fault(time_s, speed_mps, places)
+    fault = fault or speed_unit_fault(time_s, speed_mps, places)
     if fault is None:
         return ()
     return (f"{recording.name}: positions, speed_mps: {fault.found}; expected m/s",)

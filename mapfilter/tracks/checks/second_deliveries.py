@@ -34,7 +34,8 @@ def once_each(motion: pd.DataFrame) -> pd.DataFrame:
     """
     if len(motion) < 2 * _LEAST_PAIRS:
         return motion
-    values = motion[[*motion.columns.intersection(_VALUES)]].to_numpy(dtype=np.float64)
+    columns = [motion[name].to_numpy(dtype=np.float64) for name in _VALUES if name in motion]
+    values = np.column_stack(columns)
     same = (values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1]))
     step_m = motion["step_m"].to_numpy(dtype=np.float64)
     moving = np.isfinite(step_m) & (step_m != 0)

@@ -128,10 +128,13 @@ def reckoned_m(step_m: Floats, turn_rad: Floats) -> Complexes:
 
 def known_places(places: pd.DataFrame) -> tuple[Floats, Floats, Floats]:
     """Return time, east and north of finite positions, in order, of each time the first."""
-    table = places[["time_s", "east_m", "north_m"]].to_numpy(dtype=np.float64)
-    table = table[np.isfinite(table).all(axis=1)]
-    time_s, first = np.unique(table[:, 0], return_index=True)
-    return time_s, table[first, 1], table[first, 2]
+    columns = [places[name].to_numpy(dtype=np.float64) for name in ("time_s", "east_m", "north_m")]
+    known = np.logical_and.reduce([np.isfinite(values) for values in columns])
+    time_s, east_m, north_m = (values[known] for values in columns)
+    if not (np.diff(time_s) > 0).all():
+        time_s, first = np.unique(time_s, return_index=True)
+        east_m, north_m = east_m[first], north_m[first]
+    return time_s, east_m, north_m
 
 
 def stretches(

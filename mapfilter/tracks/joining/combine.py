@@ -15,7 +15,6 @@ from mapfilter.errors import InputError, MapfilterError, fail, listed
 from mapfilter.tracks.checks.beyond_crs import within_crs
 from mapfilter.tracks.checks.far_apart import check_far_apart
 from mapfilter.tracks.checks.mirrored import mirrored_notes
-from mapfilter.tracks.checks.receiver_speeds import check_speeds
 from mapfilter.tracks.checks.two_phones import two_phones_notes
 from mapfilter.tracks.joining.alignment import Alignment, align
 from mapfilter.tracks.joining.equal_times import in_order
@@ -26,6 +25,7 @@ from mapfilter.tracks.joining.moved import places_of_poses
 from mapfilter.tracks.joining.parted_odometry import parted_odometry, with_turns
 from mapfilter.tracks.joining.position_sources import fixes_of, measured_positions
 from mapfilter.tracks.joining.raw_satellites import log_pseudoranges
+from mapfilter.tracks.joining.speed_notes import speed_notes
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.motion_factors import scaled_motion
 from mapfilter.tracks.open_options import CombineOptions
@@ -67,7 +67,7 @@ def combine(recordings: Sequence[Recording], options: CombineOptions | None = No
     frame = Frame(shifted, options.crs, options.origin_deg, options.about_deg)
     shifted, beyond = within_crs(shifted, frame.crs, frame.local)
     notes = [*alignment.notes, *frame.notes, *beyond]
-    notes += [*_speed_notes(shifted, frame), *_list_notes(recordings), *two_phones_notes(shifted)]
+    notes += [*speed_notes(shifted, frame), *_list_notes(recordings), *two_phones_notes(shifted)]
     true_alone = set(options.truth) - set(options.measured)
     measured = [r for r in shifted if r.path not in true_alone]
     sensors = _sensors(measured, frame, options.truth, notes)
@@ -136,16 +136,6 @@ def _journey(recordings: Sequence[Recording]) -> list[Recording]:
     got = "only orbits of satellites" if orbits else "only a list of cells"
     hint = "name them together with a recording of pseudoranges" if orbits else _CELLS_HINT
     raise fail(InputError, names, "a recording of a journey", got, hint)
-
-
-def _speed_notes(recordings: Sequence[Recording], frame: Frame) -> list[str]:
-    """Return notes on speeds of receivers that their positions contradict."""
-    notes: list[str] = []
-    for one in recordings:
-        rows = one.tables.get("positions")
-        if rows is not None and "speed_mps" in rows:
-            notes += check_speeds(one, *frame.east_north(rows, one.crs))
-    return notes
 
 
 def _list_notes(recordings: Sequence[Recording]) -> list[str]:

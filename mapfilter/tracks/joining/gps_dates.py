@@ -15,9 +15,9 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from mapfilter._constants import DAY_S, GPS_EPOCH_S
+from mapfilter.clocks.times import utc_from_gps_s, utc_from_week_s
 from mapfilter.gnss.almanacs import WEEK_S
 from mapfilter.gnss.orbits import gps_time
-from mapfilter.tracks.readers.clocks.times import utc_from_gps_s, utc_from_week_s
 from mapfilter.tracks.readers.recorded.recording import Recording
 
 ERA_S = 1024 * WEEK_S

@@ -9,6 +9,7 @@ from pathlib import Path
 from mapfilter.errors import Faults, listed
 from mapfilter.tracks.log_folders import files_in, is_log
 from mapfilter.tracks.readers.texts.zipped import files_in_zip, is_zip
+from mapfilter.tracks.zipped_logs import is_zipped_log
 
 _MOST_S = 1e10
 
@@ -65,13 +66,13 @@ def check_origin(origin_deg: tuple[float, float], where: str, faults: Faults) ->
 
 
 def _has_logs(path: Path) -> bool:
-    """Return whether a path is a track log, or a folder of some."""
-    return path.is_dir() and any(map(is_log, (path, *path.iterdir())))
+    """Return whether a path is a track log, or a folder or ZIP of some."""
+    return is_zipped_log(path) or (path.is_dir() and any(map(is_log, (path, *path.iterdir()))))
 
 
 def _files_of(path: Path) -> list[Path]:
     """Return the recordings of a path: tables of a track log are none."""
-    if path.is_dir() and is_log(path):
+    if (path.is_dir() and is_log(path)) or is_zipped_log(path):
         return []
     if path.is_dir():
         return files_in(path)

@@ -7,15 +7,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from mapfilter.clocks.local_times import parse_zone
 from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fail, listed
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.log_folders import files_in, is_log
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions
-from mapfilter.tracks.readers.clocks.local_times import parse_zone
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import format_of, read_recording
 from mapfilter.tracks.readers.recorded.recording import Recording
 from mapfilter.tracks.readers.texts.zipped import check_zipped, files_in_zip, is_zip
+from mapfilter.tracks.zipped_logs import UNPACK, is_zipped_log
 
 
 def read_recordings(
@@ -120,6 +121,8 @@ def _expanded(paths: Sequence[Path]) -> tuple[list[Path], tuple[str, ...]]:
             hint = "name it alone; recordings cannot be added to it"
             hint = hint if len(paths) > 1 else "it is used as it is, and needs no conversion"
             raise fail(InputError, str(path), "recordings of other programs", "a track log", hint)
+        if is_zipped_log(path):
+            raise fail(InputError, str(path), "recordings of other programs", "a track log", UNPACK)
         inner = files_in(path) if is_folder else files_in_zip(path)
         known = [p for p in inner if format_of(p) is not None]
         if not is_folder:

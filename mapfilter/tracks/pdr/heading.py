@@ -231,30 +231,28 @@ def _smooth(
     spread = np.diag([np.pi**2, walks[0] ** 2])
     before, after = np.empty((count, 2)), np.empty((count, 2))
     before_p, after_p = np.empty((count, 2, 2)), np.empty((count, 2, 2))
-    moves = np.empty((count, 2, 2))
+    step_s = np.diff(time_s, prepend=time_s[:1])
+    # A yaw that grows by a rate error is put back by an offset that falls.
+    moves = np.tile(np.eye(2), (count, 1, 1))
+    moves[:, 0, 1] = -step_s
     rate_walk = _RATE_WALK * max(walks[1] / WALK_RAD_PER_SQRT_S, 1.0)
+    noise = np.diag([walks[1] ** 2, rate_walk**2]) * step_s[:, None, None]
+    values, errors = np.column_stack([measured, rates]), np.column_stack([variance, rate_sds**2])
+    known = (np.isfinite(values) & np.isfinite(errors)).tolist()
     for k in range(count):
-        step_s = time_s[k] - time_s[k - 1] if k else 0.0
-        # A yaw that grows by a rate error is put back by an offset that falls.
-        moves[k] = [[1.0, -step_s], [0.0, 1.0]]
         state = moves[k] @ state
-        noise = np.diag([walks[1] ** 2, rate_walk**2]) * step_s
-        spread = moves[k] @ spread @ moves[k].T + noise
+        spread = moves[k] @ spread @ moves[k].T + noise[k]
         before[k], before_p[k] = state, spread
-        for row, value, error in (
-            (0, measured[k], variance[k]),
-            (1, rates[k], rate_sds[k] ** 2),
-        ):
-            if not (np.isfinite(value) and np.isfinite(error)):
-                continue
-            gain = spread[:, row] / (spread[row, row] + error)
-            state = state + gain * (value - state[row])
-            spread = spread - np.outer(gain, spread[row])
+        for row in (0, 1):
+            if known[k][row]:
+                gain = spread[:, row] / (spread[row, row] + errors[k, row])
+                state = state + gain * (values[k, row] - state[row])
+                spread = spread - gain[:, None] * spread[row]
         after[k], after_p[k] = state, spread
+    back = after_p[:-1] @ moves[1:].transpose(0, 2, 1) @ np.linalg.inv(before_p[1:])
     for k in range(count - 2, -1, -1):
-        back = after_p[k] @ moves[k + 1].T @ np.linalg.inv(before_p[k + 1])
-        after[k] += back @ (after[k + 1] - before[k + 1])
-        after_p[k] += back @ (after_p[k + 1] - before_p[k + 1]) @ back.T
+        after[k] += back[k] @ (after[k + 1] - before[k + 1])
+        after_p[k] += back[k] @ (after_p[k + 1] - before_p[k + 1]) @ back[k].T
     rate_sd = float(np.sqrt(np.mean(after_p[:, 1, 1])))
     sd = np.minimum(np.sqrt(np.maximum(after_p[:, 0, 0], 0.0)), np.pi)
     return after[:, 0], sd, float(np.mean(after[:, 1])), rate_sd

@@ -12,8 +12,8 @@ import numpy as np
 
 from mapfilter._constants import KMH_MPS
 from mapfilter._words import number_of
+from mapfilter.clocks.times import LEAST_UNIX_S
 from mapfilter.errors import InputError, MapfilterError, fail
-from mapfilter.tracks.readers.clocks.times import LEAST_UNIX_S
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.recorded.recording import Clock

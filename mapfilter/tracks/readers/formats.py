@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -29,13 +32,20 @@ from mapfilter.tracks.readers import (
     tems,
     wigle,
 )
+from mapfilter.tracks.readers.contained.opening import OF_TABLES, read_any
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.recorded.recording import Recording
 from mapfilter.tracks.readers.texts import long_tables
-from mapfilter.tracks.readers.texts.separated_values import header_names, likely_separator
-from mapfilter.tracks.readers.texts.text import Text, parts_of, read_text
+from mapfilter.tracks.readers.texts.columns import Columns
+from mapfilter.tracks.readers.texts.separated_values import (
+    header_columns,
+    header_names,
+    likely_separator,
+)
+from mapfilter.tracks.readers.texts.text import Text, parts_of
 from mapfilter.tracks.readers.texts.title_lines import below_title
+from mapfilter.tracks.readers.texts.zipped import has_recording
 from mapfilter.tracks.readers.unknown_formats import JSON, NOT_READ, unknown_format
 
 FORMATS: tuple[Format, ...] = (
@@ -88,10 +98,14 @@ def find_format(text: Text) -> Format | None:
     return next((known for known in FORMATS if known.matches(text)), None)
 
 
+def _is_known(text: Text) -> bool:
+    return find_format(text) is not None
+
+
 def format_of(path: str | Path) -> Format | None:
     """Return the format that a file looks like by its beginning; None for another file."""
     try:
-        text = read_text(Path(path), _PEEKED_BYTES)
+        text = read_any(Path(path), _is_known, _PEEKED_BYTES)
     except InputError:
         return None
     found = find_format(text)
@@ -122,10 +136,14 @@ def read_recording(
     if path.is_dir():
         raise fail(InputError, str(path), "a file", "a folder", "name the files in it")
     try:
-        text = read_text(path)
+        text = read_any(path, _is_known, own=options.columns.values() if options else ())
     except InputError as error:
-        hint = NOT_READ.get(path.suffix.lower(), "")
-        raise InputError(tuple(replace(f, hint=hint or f.hint) for f in error.faults)) from error
+        suffix = path.suffix.lower()
+        hint = NOT_READ.get(suffix, "") if has_recording(path) else ""
+        of_table = [f.hint if suffix in OF_TABLES else "" for f in error.faults]
+        hints = [own or hint or f.hint for own, f in zip(of_table, error.faults, strict=True)]
+        faults = zip(error.faults, hints, strict=True)
+        raise InputError(tuple(replace(f, hint=told) for f, told in faults)) from error
     found = find_format(text)
     known = format_named(name) if name else found
     own = options is not None and bool(options.columns)
@@ -145,8 +163,10 @@ def read_recording(
     try:
         # Numbers of any size occur in damaged files; what comes of them is checked in the end.
         with np.errstate(all="ignore"):
-            for part in parts_of(text) if known.by_rows else (text,):
+            for at, part in enumerate(parts_of(text) if known.by_rows else (text,)):
+                reading.later = partial(_columns_after, text, at) if known.by_rows else tuple
                 known.read(part, reading, options)
+        reading.later = tuple
         # A large text and the tables need not be in memory at the same time.
         del text
         return reading.done(known.name)
@@ -158,6 +178,12 @@ def read_recording(
             for fault in error.faults
         )
         raise InputError(named) from error
+
+
+def _columns_after(text: Text, at: int) -> Iterator[Columns]:
+    """Yield the columns of the parts of a text after one of them."""
+    for part in islice(parts_of(text), at + 1, None):
+        yield header_columns(part.data, Reading(text.path), part.line)
 
 
 def _below_title(text: Text, options: ReadOptions | None) -> Text | None:

@@ -9,8 +9,8 @@ import numpy as np
 from mapfilter._constants import GPS_EPOCH_S, LIGHT_MPS
 from mapfilter._types import Ints
 from mapfilter._words import number_of
+from mapfilter.clocks.times import unix_seconds, utc_from_gps_s
 from mapfilter.gnss.almanacs import WEEK_S
-from mapfilter.tracks.readers.clocks.times import unix_seconds, utc_from_gps_s
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.plain_csv import has_content
 from mapfilter.tracks.readers.recorded.reading import Reading

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mapfilter.tracks.readers.clocks.times import unix_seconds
+from mapfilter.clocks.times import unix_seconds
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recorded.identities import add_radio
 from mapfilter.tracks.readers.recorded.reading import Reading

@@ -37,8 +37,8 @@ import numpy as np
 from mapfilter._constants import KMH_MPS
 from mapfilter._types import Ints
 from mapfilter._words import number_of
+from mapfilter.clocks.local_times import utc_from_local_s
 from mapfilter.tracks.readers.clocks.local_parts import note_changes
-from mapfilter.tracks.readers.clocks.local_times import utc_from_local_s
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.nemo_identities import (
     Identities,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,6 +11,8 @@ import pandas as pd
 
 from mapfilter._constants import DAY_S, KNOT_MPS
 from mapfilter._types import Floats, Ints
+from mapfilter._words import number_of
+from mapfilter.errors import listed
 from mapfilter.tracks.joining.position_units import RADIUS_68, UERE_M
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.nmea_sentences import sentences
@@ -32,6 +35,9 @@ _KINDS = {
     b"ZDA": ("time", "day", "month", "year"),
 }
 _FIELDS = 20
+_OWN_SENTENCE = re.compile(rb"\$(P[A-Z0-9]{2,12}),")
+_OF_CELLS = ("CELL", "GSM", "LTE", "RSSI", "RSRP", "CSQ", "QENG")
+"""Parts of the names of sentences that loggers write among those of a receiver."""
 
 
 def _matches(text: Text) -> bool:
@@ -43,6 +49,7 @@ def _matches(text: Text) -> bool:
 def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
     reading.program, reading.clock = "NMEA 0183 receiver", Clock("utc")
     found = sentences(text.data, _KINDS, reading)
+    _note_cells(text.data, reading)
     tables = {kind: _table(kind, *found.pop(kind), reading) for kind in _KINDS}
     dates = _dates(tables)
     if dates.empty:
@@ -65,6 +72,17 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: 
     columns = {name: first[name].to_numpy() for name in first.columns}
     columns["accuracy_m"] = np.where(np.isnan(accuracy), columns["accuracy_m"], accuracy)
     reading.add("positions", columns, columns["line"])
+
+
+def _note_cells(data: bytes, reading: Reading) -> None:
+    """Note sentences of a user's own with cells, which no standard describes."""
+    kinds = Counter(found.decode() for found in _OWN_SENTENCE.findall(data))
+    cells = {kind: n for kind, n in kinds.items() if any(word in kind for word in _OF_CELLS)}
+    if cells:
+        names = listed([f"${kind}" for kind in cells], 5)
+        count = number_of(sum(cells.values()), "sentence")
+        hint = "write them as CSV of time, mcc, mnc, lac, ci, rsrp, and name both files"
+        reading.ignore(f"{count}, perhaps of cells, not used: {names} ({hint})")
 
 
 def _table(kind: bytes, lines: list[bytes], places: Ints, reading: Reading) -> Columns:

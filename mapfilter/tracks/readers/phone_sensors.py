@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from mapfilter._types import Floats
+from mapfilter._words import number_of
+from mapfilter.clocks.times import unix_seconds
 from mapfilter.errors import InputError, MapfilterError, fail
-from mapfilter.tracks.readers.clocks.times import unix_seconds
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.plain.fields import usual_fields
 from mapfilter.tracks.readers.plain.headers import stated_fields
@@ -55,6 +56,8 @@ _SENSOR_LOGGER = {
     "magnetometeruncalibrated": "magnetometer",
     "magnetometer": "magnetometer",
 }
+_OTHERS_IN_JSON = ("location", "orientation", "barometer", "pedometer", "compass")
+"""Beginnings of the names of what is read besides."""
 
 
 def _names(text: Text) -> tuple[str, ...]:
@@ -167,6 +170,39 @@ def _is_sensor_logger(text: Text) -> bool:
 def _read_sensor_logger(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: ARG001
     reading.program, reading.clock = "Sensor Logger", Clock("utc")
     rows = header_columns(text.data, reading, text.line)
+    if not rows.has("sensor"):
+        _add_logged(rows, reading, reading.path.name)
+        return
+    # Its JSON has the rows of all sensors; each fills columns of its own.
+    words = rows.texts("sensor")
+    taken: set[str] = set()
+    for word in sorted(dict.fromkeys(words.tolist()), key=_uncalibrated_last):
+        at = np.flatnonzero(words == word)
+        sensor = _of_json(word)
+        if not sensor or sensor in taken:
+            why = "" if not sensor else f" (a second {sensor})"
+            reading.ignore(f"{word or 'no name'}: {number_of(at.size, 'row')} not used{why}")
+            continue
+        taken.add(sensor)
+        held = [name for name in rows.names if (rows.texts(name)[at] != "").any()]
+        columns = {name: (name, at, np.arange(at.size)) for name in held}
+        _add_logged(rows.picked(columns, rows.line[at]), reading, word)
+
+
+def _uncalibrated_last(word: str) -> bool:
+    return "uncalibrated" in word.lower()
+
+
+def _of_json(word: str) -> str:
+    """Return the sensor of a name in JSON; "" for one that is not read."""
+    stem = re.sub(r"[^a-z]", "", word.lower())
+    if stem in _SENSOR_LOGGER:
+        return _SENSOR_LOGGER[stem]
+    return stem if stem.startswith(_OTHERS_IN_JSON) else ""
+
+
+def _add_logged(rows: Columns, reading: Reading, name: str) -> None:
+    """Add what a file of Sensor Logger, or a sensor in its JSON, has; its name tells sensors."""
     time_s = unix_seconds(rows.number("time"))
     if rows.has("latitude", "longitude"):
         speed, course = rows.number("speed"), rows.number("bearing")
@@ -179,7 +215,7 @@ def _read_sensor_logger(text: Text, reading: Reading, options: ReadOptions) -> N
             # -1 where unknown.
             "speed_mps": np.where(speed < 0, np.nan, speed),
             "course_deg": np.where(course < 0, np.nan, course),
-            "provider": _provider(reading.path.name),
+            "provider": _provider(name),
         }
         reading.add("positions", columns, rows.line)
     elif rows.has("pressure"):
@@ -198,7 +234,7 @@ def _read_sensor_logger(text: Text, reading: Reading, options: ReadOptions) -> N
         columns = {"time_s": time_s, "magnetic_deg": rows.number("magneticbearing")}
         reading.add("compass", columns, rows.line)
     elif rows.has("x", "y", "z"):
-        _add_axes(rows, reading, _sensor(rows, reading), time_s, ["x", "y", "z"])
+        _add_axes(rows, reading, _sensor(rows, reading, name), time_s, ["x", "y", "z"])
     else:
         got = ", ".join(rows.names)[:100]
         expected = "columns of a sensor or of positions"
@@ -211,9 +247,9 @@ def _provider(name: str) -> str:
     return next((one for one in ("gps", "network") if stem.endswith(one)), "fused")
 
 
-def _sensor(rows: Columns, reading: Reading) -> str:
+def _sensor(rows: Columns, reading: Reading, named: str) -> str:
     """Return the sensor by the file's name, else by what a phone at rest measures."""
-    stem = re.sub(r"[^a-z]", "", reading.path.name.split(".")[0].lower())
+    stem = re.sub(r"[^a-z]", "", named.split(".")[0].lower())
     for name, sensor in _SENSOR_LOGGER.items():
         if stem.startswith(name) or stem.endswith(name):
             return sensor

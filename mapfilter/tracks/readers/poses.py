@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 
 from mapfilter._types import Floats, Ints
+from mapfilter.clocks.times import LEAST_UNIX_S
 from mapfilter.errors import MapfilterError
-from mapfilter.tracks.readers.clocks.times import LEAST_UNIX_S
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.plain.fields import usual_fields
 from mapfilter.tracks.readers.plain.headers import stated_fields

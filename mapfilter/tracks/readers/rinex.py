@@ -12,7 +12,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 
 from mapfilter._constants import GPS_EPOCH_S
-from mapfilter.tracks.readers.clocks.times import utc_from_gps_s
+from mapfilter.clocks.times import utc_from_gps_s
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.recorded.recording import Clock

@@ -10,8 +10,8 @@ import numpy as np
 
 from mapfilter._constants import DAY_S
 from mapfilter._words import number_of
+from mapfilter.clocks.times import utc_from_gps_s
 from mapfilter.gnss.almanacs import WEEK_S
-from mapfilter.tracks.readers.clocks.times import utc_from_gps_s
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.recorded.recording import Clock

@@ -11,10 +11,10 @@ import numpy as np
 
 from mapfilter._constants import GPS_EPOCH_S
 from mapfilter._types import Floats
+from mapfilter.clocks.times import utc_from_gps_s, utc_from_week_s
 from mapfilter.errors import InputError, fail
 from mapfilter.gnss.almanacs import WEEK_S
 from mapfilter.tracks.joining.position_units import RADIUS_68
-from mapfilter.tracks.readers.clocks.times import utc_from_gps_s, utc_from_week_s
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.recorded.recording import Clock
@@ -28,6 +28,7 @@ _HEADER = re.compile(
 _PROGRAM = re.compile(r"^% program\s*:\s*(\S.*)$")
 _JST_S = 9 * 3600.0
 _WEEK = re.compile(rb"^ ?\d{1,4} \d{1,6}(?:\.\d{0,9})? ", re.MULTILINE)
+_PARTED, _PARTS = ["latitude(d'\")", "longitude(d'\")"], (".deg", ".min", ".sec")
 _AS_DEGREES = "decimal degrees (solution format Lat/Lon/Height, ddd.ddd of RTKLIB)"
 
 
@@ -50,13 +51,19 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: 
         expected = "a line of RTKLIB with the names of columns (output header)"
         raise fail(InputError, str(reading.path), expected, "none")
     names = header[2].replace(",", " ").replace(";", " ").split()
-    if names[:2] != ["latitude(deg)", "longitude(deg)"]:
+    parted = names[:2] == _PARTED
+    if not parted and names[:2] != ["latitude(deg)", "longitude(deg)"]:
         raise fail(InputError, str(reading.path), _AS_DEGREES, " ".join(names[:3]))
     data = re.sub(rb"^%.*$", b"", text.data, flags=re.MULTILINE)
     data = split_blanks(data.replace(b",", b" ").replace(b";", b" "))
-    columns = ["date", "clock", *(name.partition("(")[0].lower() for name in names)]
+    plain = [name.partition("(")[0].lower() for name in names]
+    if parted:
+        plain[:2] = [f"{name}{part}" for name in plain[:2] for part in _PARTS]
+    columns = ["date", "clock", *plain]
     # What follows height and quality may be absent.
-    rows = value_columns(memoryview(data), reading, columns, " ", text.line, ragged=5)
+    rows = value_columns(
+        memoryview(data), reading, columns, " ", text.line, ragged=9 if parted else 5
+    )
     weeks = _WEEK.search(data) is not None
     time_s = _weeks_s(rows, header[1]) if weeks else _dates_s(rows, header[1])
     reading.clock = Clock("gps" if header[1] == "GPST" else "utc")
@@ -64,14 +71,25 @@ def _read(text: Text, reading: Reading, options: ReadOptions) -> None:  # noqa: 
     sd_m = np.sqrt((rows.number("sdn") ** 2 + rows.number("sde") ** 2) / 2)
     positions = {
         "time_s": time_s,
-        "lat_deg": rows.number("latitude"),
-        "lon_deg": rows.number("longitude"),
+        "lat_deg": _degrees(rows, "latitude"),
+        "lon_deg": _degrees(rows, "longitude"),
         "altitude_m": rows.number("height"),
         "accuracy_m": RADIUS_68 * np.where(sd_m > 0, sd_m, np.nan),
         "speed_mps": np.hypot(east_mps, north_mps),
         "course_deg": np.degrees(np.arctan2(east_mps, north_mps)) % 360,
     }
     reading.add("positions", positions, rows.line)
+
+
+def _degrees(rows: Columns, name: str) -> Floats:
+    """Return degrees, also of degrees, minutes and seconds; the sign is that of the degrees."""
+    if rows.has(name):
+        return rows.number(name)
+    degrees, minutes, seconds = (rows.number(f"{name}{part}") for part in _PARTS)
+    good = (minutes >= 0) & (minutes < 60) & (seconds >= 0) & (seconds <= 60)
+    size = np.abs(degrees) + minutes / 60 + seconds / 3600
+    # -0 has a sign, too.
+    return np.where(good, np.copysign(size, degrees), np.nan)
 
 
 def _weeks_s(rows: Columns, system: str) -> Floats:

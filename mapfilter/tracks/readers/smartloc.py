@@ -8,8 +8,8 @@ import numpy as np
 from pyproj import Transformer
 
 from mapfilter._types import Floats
+from mapfilter.clocks.times import utc_from_week_s
 from mapfilter.gnss.earth_rotation import in_frame_of_reception
-from mapfilter.tracks.readers.clocks.times import utc_from_week_s
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.recorded.recording import Clock

@@ -31,7 +31,8 @@ import numpy as np
 import pandas as pd
 
 from mapfilter._types import Bools, Floats
-from mapfilter.tracks.readers.clocks.times import without_midnights
+from mapfilter.clocks.times import without_midnights
+from mapfilter.errors import InputError, fail
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.plain_csv import has_content
 from mapfilter.tracks.readers.recorded.identities import add_radio, available
@@ -122,7 +123,11 @@ def _matches(text: Text) -> bool:
 def _read(text: Text, reading: Reading, options: ReadOptions) -> None:
     reading.program = "TEMS Investigation"
     rows = header_columns(text.data, reading, text.line)
+    own = any(name.startswith("all-") for name in rows.names)
     rows = replace(rows, names=tuple(_plain(name) for name in rows.names))
+    if not (own or {name.partition("[")[0] for name in rows.names} & _LEVELS or _matches(text)):
+        expected = "elements of TEMS, such as All-Serving Cell RSRP (dBm)[1]"
+        raise fail(InputError, f"{reading.path} header", expected, ", ".join(rows.names)[:200])
     time_s = _times(rows, reading, options)
     _add_positions(rows, reading, time_s)
     messages = _Messages(rows, reading, time_s, _renewed(rows, reading, time_s))

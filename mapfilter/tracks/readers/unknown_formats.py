@@ -32,6 +32,7 @@ _FIELD_OF_UNIT = {
 }
 """Fields that a column whose name is of another language may be, by its unit."""
 _ENDS = {"lat_deg": ("lat", "latitude"), "lon_deg": ("lon", "long", "lng", "longitude")}
+_NUMBER = re.compile(r"[+-]?\d{1,20}(?:[.,]\d{0,20})?", re.ASCII)
 _PARTED = re.compile(r"[._ :/]")
 """Last parts of names of columns, and what they are parted by."""
 _MESSAGES = "messages of an autopilot; export one kind as CSV (mavlogdump.py, types GPS)"
@@ -50,6 +51,7 @@ _LAYOUTS = (
 )
 """First lines of exports whose columns are no quantities, and what to do."""
 RAW_FRAMES = "raw frames of a bus; decode them by its DBC (cantools), export signals as CSV"
+_JSON = "JSON without records of places or cells; export GPX, or a table as CSV"
 NOT_READ = {
     ".nmf": "a Nemo log that is no text of Nemo file format 2; export it as CSV, map the columns",
     ".dt1": "a Nemo log of version 1; export it as CSV, and map the columns",
@@ -62,14 +64,14 @@ NOT_READ = {
     ".vbo": "a VBOX file; export CSV, GPX or NMEA",
     ".kml": "KML; export GPX, or a table as CSV",
     ".kmz": "KML; export GPX, or a table as CSV",
-    ".geojson": "GeoJSON; export GPX, or a table as CSV",
-    ".json": "JSON; export GPX, or a table as CSV",
-    ".jsonl": "JSON; export GPX, or a table as CSV",
-    ".ndjson": "JSON; export GPX, or a table as CSV",
+    ".geojson": "GeoJSON without points that have times; export GPX, or a table as CSV",
+    ".json": _JSON,
+    ".jsonl": _JSON,
+    ".ndjson": _JSON,
     ".fit": "a FIT file; export GPX",
-    ".tcx": "a TCX file; export GPX",
+    ".tcx": "no TCX file with places; export GPX",
     ".igc": "an IGC file; export GPX",
-    ".gpkg": "a GeoPackage; export its tables as CSV",
+    ".gpkg": "no GeoPackage; export its table as CSV",
     ".pos": "a solution of RTKLIB without its line of names; write it with its output header",
     ".ubx": "binary messages of a u-blox receiver; export NMEA, or RINEX",
     ".sbf": "binary messages of a Septentrio receiver; export NMEA, or RINEX",
@@ -79,9 +81,9 @@ NOT_READ = {
     ".bag": "a bag of ROS; write its topics as CSV (rostopic echo -b BAG -p TOPIC)",
     ".db3": "a bag of ROS 2; write its topics as CSV",
     ".mcap": "a bag of ROS 2; write its topics as CSV",
-    ".xlsx": "a spreadsheet; export it as CSV",
-    ".xls": "a spreadsheet; export it as CSV",
-    ".ods": "a spreadsheet; export it as CSV",
+    ".xlsx": "no workbook that can be read; export it as CSV",
+    ".xls": "no workbook that can be read; export it as CSV",
+    ".ods": "no workbook that can be read; export it as CSV",
 }
 """Suffixes of formats that are not read, and what to do."""
 
@@ -90,11 +92,13 @@ def _other_separators(path: Path, text: Text, find_format: Callable[[Text], Form
     """Return the hint for a file that would be of a known format with other separators."""
     head = "\n".join(text.head)
     for own, other in itertools.permutations("\t;, ", 2):
+        if own not in head:
+            continue
         if own == " " and any(one in text.first_line for one in _SEPARATORS if one != own):
             # Blanks between words of a table's header separate nothing.
             continue
         found = find_format(Text(path, head.replace(own, other).encode()))
-        if own in head and found is not None:
+        if found is not None:
             return f"{found.title} with {_SEPARATORS[own]} where {_SEPARATORS[other]} should be"
     return ""
 
@@ -107,12 +111,15 @@ def unknown_format(
     names = header_names(text.first_line, separator)
     is_table = len(names) > 1 and not text.first_line.lstrip().startswith(("{", "[", "<"))
     known = (hint for layout, hint in _LAYOUTS if layout.search(text.first_line))
-    hint = NOT_READ.get(path.suffix.lower(), "") or next(known, "")
+    # The columns of what was taken from another form are those of a CSV.
+    hint = "" if text.made_of else NOT_READ.get(path.suffix.lower(), "") or next(known, "")
     hint = hint or _other_separators(path, text, find_format)
     if text.first_line.lstrip().startswith(JSON):
         hint = hint or NOT_READ[".json"]
     if is_table and not hint and _is_plan(names):
         hint = "a list of cells, no journey: name it as [cells] plan"
+    if is_table and not hint and _is_of_numbers(names):
+        hint = "a table without a line of names: write one above it, such as time,lat,lon,rsrp"
     if is_table and not hint:
         raw = {"databytes", "data bytes", "dlc"} & set(names) or {"id", "d1", "d2"} <= set(names)
         hint = RAW_FRAMES if raw else other_names(names)
@@ -120,6 +127,12 @@ def unknown_format(
     if is_table:
         got = f"none of them, but a table with the columns {listed([n for n in names if n])}"
     return fail(InputError, str(path), f"a recording in a known format ({_LIST})", got, hint)
+
+
+def _is_of_numbers(names: Sequence[str]) -> bool:
+    """Return whether most names of columns are numbers: values of the first row."""
+    numbers = sum(_NUMBER.fullmatch(name) is not None for name in names)
+    return 2 * numbers > len(names)
 
 
 def _is_plan(names: Sequence[str]) -> bool:

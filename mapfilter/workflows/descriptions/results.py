@@ -36,24 +36,26 @@ _LOCATE_USE = "located positions, not to be taken for a ground truth; QGIS opens
 
 
 def result_info(path: Path) -> dict[str, Any] | None:
-    """Describe a result of ``replay`` or ``locate``, a folder or an estimate; None for others.
+    """Describe a result of ``replay`` or ``locate``; None for others.
+
+    A result is a folder, an estimate, or the figures of one or of several logs.
 
     Raises
     ------
     StoreError
         An estimate, or the figures beside one, are damaged.
     """
-    if path.is_file() and path.name not in ESTIMATES:
+    if path.is_file() and path.name not in (*ESTIMATES, FIGURES, SUMMARY):
         return None
     folder = path if path.is_dir() else path.parent
-    figures = _read(folder / FIGURES)
+    figures = {} if path.name == SUMMARY else _read(folder / FIGURES)
     if is_of_replay(figures):
-        return _replay_info("replay" if path.is_dir() else "estimate", folder, figures)
-    if path.is_file():
+        return _replay_info("estimate" if path.name in ESTIMATES else "replay", folder, figures)
+    if path.name in ESTIMATES:
         return _estimate_info(path) if path.suffix == ".parquet" else None
     if is_of_reports(figures):
         return {"kind": "located reports", **_some(figures, _OF_REPORTS), "use": _LOCATE_USE}
-    several = _read(folder / SUMMARY)
+    several = {} if path.name == FIGURES else _read(folder / SUMMARY)
     return _replay_info("replays", folder, several) if _OF_SEVERAL in several else None
 
 

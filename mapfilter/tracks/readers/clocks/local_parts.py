@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mapfilter._types import Floats
-from mapfilter.tracks.readers.clocks.local_times import LONGEST_STEP_S, change_notes, doubled_s
+from mapfilter.clocks.local_times import LONGEST_STEP_S, change_notes, doubled_s
 from mapfilter.tracks.readers.recorded.reading import Reading
 
 
@@ -21,7 +21,7 @@ def note_changes(
     ----------
     reading : Reading
     local_s, utc_s, zone, after_s
-        As of :func:`mapfilter.tracks.readers.clocks.local_times.change_notes`.
+        As of :func:`mapfilter.clocks.local_times.change_notes`.
     """
     notes = change_notes(local_s, utc_s, zone, after_s)
     for note in notes:

@@ -7,12 +7,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mapfilter.errors import listed
 from mapfilter.tracks.readers.plain.date_parts import of_parts, parts_of_dates
+from mapfilter.tracks.readers.plain.served_names import states_serving, with_served_names
 from mapfilter.tracks.readers.texts.columns import Columns
 
 _FIT_EPOCH_S = 631_065_600
 """Unix time of 31 December 1989, from which FIT counts seconds."""
 _FIT_TIME = "record.timestamp[s]"
+_SECONDS = "header.stamp.sec"
+_ROS_2 = frozenset((_SECONDS, "header.stamp.nanosec"))
+"""The two parts of a time, as converters of bags of ROS 2 write them."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +84,18 @@ _PROGRAMS = (
         },
     ),
     _Program(
+        "columns as of messages of ROS 2",
+        _ROS_2,
+        {
+            _SECONDS: "time",
+            "header.stamp.nanosec": "",
+            "twist.twist.linear.x": "wheel speed [m/s]",
+            "twist.twist.angular.z": "yaw rate [rad/s]",
+            **{f"angular_velocity.{axis}": f"gyr_{axis}" for axis in "xyz"},
+            **{f"linear_acceleration.{axis}": f"acc_{axis}" for axis in "xyz"},
+        },
+    ),
+    _Program(
         "columns as of positions of PX4 (degrees times 1e7, mm)",
         frozenset(("time_utc_usec", "lat", "lon", "fix_type")),
         {
@@ -122,6 +139,53 @@ _PROGRAMS = (
         {"elevation": "altitude [m]", "speed": "speed [m/s]"},
     ),
     _Program(
+        "columns as of gpsd (m, m/s)",
+        frozenset(("class", "device", "mode", "time", "lat", "lon")),
+        {
+            **dict.fromkeys(("altmsl", "alt"), "altitude [m]"),
+            "eph": "accuracy [m]",
+            "speed": "speed [m/s]",
+            "track": "course [deg]",
+            "mode": "fix_type",
+        },
+    ),
+    _Program(
+        "columns as of OwnTracks (m, km/h)",
+        frozenset(("_type", "tst", "lat", "lon")),
+        {
+            "tst": "timestamp",
+            "acc": "accuracy [m]",
+            "alt": "altitude [m]",
+            "vel": "speed [km/h]",
+            "cog": "course [deg]",
+        },
+    ),
+    _Program(
+        "columns as of Google's location history (degrees times 1e7)",
+        frozenset(("latitudee7", "longitudee7")),
+        {
+            "timestampms": "timestamp",
+            "latitudee7": "lat [dege7]",
+            "longitudee7": "lon [dege7]",
+            "accuracy": "accuracy [m]",
+            "heading": "course [deg]",
+            "velocity": "speed [m/s]",
+        },
+    ),
+    _Program(
+        "columns as of Mozilla's location service (geosubmit)",
+        frozenset(("mobilecountrycode", "mobilenetworkcode", "cellid")),
+        {
+            "mobilecountrycode": "mcc",
+            "mobilenetworkcode": "mnc",
+            "locationareacode": "lac",
+            "primaryscramblingcode": "psc",
+            "radiotype": "radio",
+            "signalstrength": "level [dbm]",
+            "timingadvance": "ta",
+        },
+    ),
+    _Program(
         "columns as of records of FIT (semicircles, seconds since 1989-12-31)",
         frozenset((_FIT_TIME, "record.position_lat[semicircles]")),
         {
@@ -159,7 +223,7 @@ def full_names(names: Sequence[str], own: Collection[str] = ()) -> tuple[str, ..
             else name
             for name in names
         )
-    return of_parts(found, own)
+    return of_parts(with_served_names(found, own), own)
 
 
 def with_full_names(rows: Columns, own: Collection[str]) -> Columns:
@@ -171,11 +235,21 @@ def with_full_names(rows: Columns, own: Collection[str]) -> Columns:
     names = full_names(rows.names, own)
     if names == rows.names:
         return rows
+    served = with_served_names(rows.names, own)
+    renamed = [old for old, new in zip(rows.names, served, strict=True) if old != new]
+    if renamed:
+        rows.reading.note(f"taken for those of the serving cell: {listed(renamed)}")
     if known is not None:
         rows.reading.note(known.note)
+        if known.marks >= _ROS_2:
+            seconds, nanoseconds = (rows.number(name) for name in sorted(_ROS_2, key=len))
+            rows = rows.filled(_SECONDS, _texts(seconds + nanoseconds / 1e9))
         if _FIT_TIME in known.marks and _FIT_TIME not in own:
             rows = rows.filled(_FIT_TIME, _texts(rows.number(_FIT_TIME) + _FIT_EPOCH_S))
-    return replace(parts_of_dates(rows, own), names=names)
+    found = replace(parts_of_dates(rows, own), names=names)
+    # A cell without an identity would be a neighbour.
+    states = any(map(states_serving, renamed)) and not found.has("role")
+    return found.with_column("role", "serving") if states else found
 
 
 def _program(names: Sequence[str]) -> _Program | None:

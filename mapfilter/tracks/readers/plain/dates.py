@@ -63,6 +63,7 @@ def with_dates(mapped: Mapped) -> Mapped:
 
 def _joined(mapped: Mapped, rows: Columns, date: str, name: str) -> Mapped:
     rows.reading.note(f"time: columns {date} and {name}")
+    rows.reading.date_column = date
     return replace(mapped, rows=rows.joined(date, name), beside=(date,), date=date)
 
 

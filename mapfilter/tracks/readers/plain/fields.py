@@ -4,17 +4,11 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Collection, Mapping, Sequence
-from difflib import SequenceMatcher, get_close_matches
+from difflib import get_close_matches
+from itertools import permutations
 
-from mapfilter._header_units import parted_unit
 from mapfilter.errors import Faults
 
-_ALIKE, _ALIKE_SHORT = 0.8, 0.85
-_ALIKE_WORDS = 0.65
-"""The same of each of several words: vehicle_type is no vehicle_speed."""
-_SHORT = 4
-"""Names of so many letters resemble others that differ in one; shorter ones by chance only."""
-_UNITS = ("_rad", "_deg", "_radps", "_degps", "_kmh", "_mps", "_km", "_m")
 _UNIT_WORDS = {
     "_mps": "m/s",
     "_kmh": "km/h",
@@ -28,17 +22,23 @@ _UNIT_WORDS = {
     "odometer_m": "m",
 }
 """Units of fields by their endings, in words."""
+_CODES = tuple("/".join(some) for n in (2, 3) for some in permutations(("pci", "psc", "bsic"), n))
+"""Names of a column of codes of several technologies."""
 _NAMES: Mapping[str, tuple[str, ...]] = {
     "time": (
         *("time", "time_s", "timestamp", "datetime", "utc", "unix_time", "date_time", "t"),
         *("timestamps", "timestep_time", "time_utc_usec"),
+        *("ts", "time_stamp", "epoch", "unix_timestamp"),
         *("measured_at", "recorded_at", "tow", "tow_s", "gps_tow", "time_of_week"),
         "yyyy-mo-dd hh-mi-ss_sss",
     ),
-    "lat_deg": ("lat_deg", "lat", "latitude", "location latitude :"),
+    "lat_deg": (
+        *("lat_deg", "lat", "latitude", "location latitude :"),
+        *("gps_latitude", "gps_lat", "gnss_latitude", "gnss_lat"),
+    ),
     "lon_deg": (
-        *("lon_deg", "lon", "lng", "long", "longitude", "longtitude"),
-        "location longitude :",
+        *("lon_deg", "lon", "lng", "long", "longitude", "longtitude", "location longitude :"),
+        *("gps_longitude", "gps_lon", "gps_long", "gps_lng", "gnss_longitude", "gnss_lon"),
     ),
     "altitude_m": ("altitude_m", "altitude", "ele", "height_m"),
     "accuracy_m": ("accuracy_m", "accuracy"),
@@ -76,7 +76,7 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
     "enodeb": ("enodeb", "enodeb_id", "enodebid", "enb", "enb_id", "enbid"),
     "sector": ("sector", "sector_id", "sectorid", "cell_number", "local_cell_id", "lcid"),
     "arfcn": ("arfcn", "uarfcn", "earfcn", "nrarfcn", "nr_arfcn", "narfcn"),
-    "bsic": ("bsic", "psc", "pci", "psc_or_pci", "pci_psc"),
+    "bsic": ("bsic", "psc", "pci", "psc_or_pci", "pci_psc", *_CODES),
     "level_dbm": (
         *("level_dbm", "dbm", "rsrp", "rscp", "rssi", "signal_dbm", "ss_rsrp", "ssrsrp"),
     ),
@@ -115,7 +115,8 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
 
 def usual_fields(names: Collection[str]) -> dict[str, str]:
     """Return the columns that have usual names of fields, by field."""
-    found = ((field, next((n for n in some if n in names), "")) for field, some in FIELDS.items())
+    known = frozenset(names)
+    found = ((field, next((n for n in some if n in known), "")) for field, some in FIELDS.items())
     return {field: name for field, name in found if name}
 
 
@@ -126,61 +127,9 @@ MOTION_FIELDS = (
 """Fields of which motion is made; step_m, steps, a wheel speed or an odometer among them."""
 
 
-def meant(column: str, taken: Collection[str] = ()) -> str:
-    """Return the field that a column's name resembles, in the same unit; "" for none.
-
-    A misspelling keeps the first letter, adds no word, and leaves the axis of a sensor.
-
-    Parameters
-    ----------
-    column : str
-        In lower case.
-    taken : collection of str
-        Fields that other columns hold.
-
-    Examples
-    --------
-    >>> [meant(name) for name in ("stepcount", "compas", "compass_rad", "operator")]
-    ['steps', 'compass_deg', '', '']
-    """
-    names = {name: field for field, some in FIELDS.items() if field not in taken for name in some}
-    likeness = {name: _likeness(column, name, field) for name, field in names.items()}
-    near = max(likeness, key=likeness.__getitem__, default="")
-    return names[near] if near and likeness[near] else ""
-
-
-def _likeness(column: str, name: str, field: str) -> float:
-    """Return how alike a column's name and one of a field are; 0 for not enough."""
-    text, own = parted_unit(column)[0], parted_unit(name)[0]
-    if any(column.endswith(unit) != name.endswith(unit) for unit in _UNITS if unit in column):
-        return 0.0
-    if text[:1] != own[0] or len(_words(text)) > len(_words(name)):
-        return 0.0
-    if is_of_axis(field) and text[-1] != field[-1]:
-        return 0.0
-    words, others = _words(text), _words(own)
-    if len(words) == len(others) and any(map(_differ, words, others)):
-        return 0.0
-    found = [0.0]
-    for one in (own, "".join(_words(name))):
-        ratio = SequenceMatcher(None, text, one).ratio()
-        least = _ALIKE_SHORT if len(one) == _SHORT else _ALIKE
-        found += [ratio] if len(one) >= _SHORT and ratio >= least else []
-    return max(found)
-
-
-def _differ(word: str, other: str) -> bool:
-    """Return whether two words are no misspelling of one another."""
-    return SequenceMatcher(None, word, other).ratio() < _ALIKE_WORDS
-
-
 def is_of_axis(field: str) -> bool:
     """Return whether a field is of one axis of a sensor."""
     return field.endswith(("_x", "_y", "_z"))
-
-
-def _words(name: str) -> list[str]:
-    return name.replace("_", " ").split()
 
 
 def column_option(field: str, column: str) -> str:

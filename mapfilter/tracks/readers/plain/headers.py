@@ -7,11 +7,14 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import TypeAlias
 
 from mapfilter._header_units import UNITS, parted_unit, quantity_of
-from mapfilter.tracks.readers.plain.fields import FIELDS, is_of_axis, meant
+from mapfilter.tracks.readers.plain.fields import FIELDS, is_of_axis, usual_fields
+from mapfilter.tracks.readers.plain.misspelt import meant
+from mapfilter.tracks.readers.plain.served_names import served_name
 
 QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "time": (
         *("time", "timestamp", "date time", "local time", "unix time", "epoch time"),
+        *("event time", "message time", "measurement time", "record time", "log time", "fix time"),
         *("elapsed time", "time elapsed", "seconds elapsed", "device time", "gps time", "date"),
         *("tow", "gps tow", "time of week", "gps time of week"),
     ),
@@ -87,6 +90,8 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
 """Words for the quantity of a field, in any order; times of the first of several columns."""
 
 _ALSO_MEANT: Mapping[str, tuple[str, ...]] = {
+    "east_m": ("utm x", "utm east", "utm easting", "x utm"),
+    "north_m": ("utm y", "utm north", "utm northing", "y utm"),
     "cell": ("cell name", "cellname", "serving cell name", "transmitter"),
     "odometer_m": (
         *("distance", "trip distance", "total distance", "distance travelled", "trip"),
@@ -224,8 +229,15 @@ def likely_fields(column: str, taken: Collection[str]) -> list[str]:
         held.add("cell")
     if stated := [field for field in fields_meant(column) if field not in held]:
         return stated
+    # Of several carriers a user knows which is meant.
+    if served := [*usual_fields([_of_level(served_name(column))])]:
+        return [field for field in served if field not in held]
     near = "" if "[" in column or "(" in column else meant(column, held)
     return [near] if near else []
+
+
+def _of_level(name: str) -> str:
+    return "level_dbm" if name == "level [dbm]" else name
 
 
 def _fits(field: str, unit: str) -> bool:

@@ -12,20 +12,21 @@ import pyarrow as pa
 from mapfilter._constants import DAY_S
 from mapfilter._types import Floats
 from mapfilter._words import number_of
-from mapfilter.errors import InputError, fail
-from mapfilter.tracks.readers.clocks.local_parts import note_changes
-from mapfilter.tracks.readers.clocks.local_times import utc_from_local_s
-from mapfilter.tracks.readers.clocks.times import (
+from mapfilter.clocks.local_times import utc_from_local_s
+from mapfilter.clocks.time_hints import hint_on_time
+from mapfilter.clocks.times import (
     LEAST_UNIX_S,
     are_days,
     in_days,
-    parse_times,
     unix_seconds,
     utc_from_gps_s,
     utc_from_week_s,
     without_midnights,
 )
-from mapfilter.tracks.readers.clocks.written_dates import are_compact, order_of, with_year_first
+from mapfilter.clocks.written_dates import are_compact
+from mapfilter.clocks.written_times import written_times
+from mapfilter.errors import InputError, fail
+from mapfilter.tracks.readers.clocks.local_parts import note_changes
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.plain.dates import OF_DAY, seconds_in_digits
 from mapfilter.tracks.readers.plain.headers import columns_of
@@ -116,7 +117,7 @@ def times_of(mapped: Mapped, reading: Reading, options: ReadOptions) -> Floats:
         at = next((row for row, text in enumerate(texts) if text), 0)
         where = f"{reading.path} row {mapped.rows.line[at]}, time"
         raise fail(
-            InputError, where, _TIMES, repr(texts[at][:40] or "nothing"), _of_time(texts[at])
+            InputError, where, _TIMES, repr(texts[at][:40] or "nothing"), hint_on_time(texts[at])
         )
     return _over_midnight(mapped, reading, time_s)
 
@@ -162,10 +163,8 @@ def _certainty(name: str, text: str) -> int:
         seconds = float(unix_seconds([float(number)])[0])
         sure = _EARLY_S < seconds < _LATEST_S and np.isnan(_since_1980(name, seconds))
         return 3 if sure else 1
-    column = pa.chunked_array([[text]])
-    text = with_year_first(column, order_of(column))[0].as_py()
-    time_s, zoned = parse_times(np.array([text], dtype=object), "UTC" if "utc" in name else "")
-    return (3 if zoned else 2) if np.isfinite(time_s).all() else 0
+    found = written_times(pa.chunked_array([[text]]), "UTC" if "utc" in name else "")
+    return (3 if found.zoned else 2) if np.isfinite(found.time_s).all() else 0
 
 
 def _without_digits(reading: Reading, number: Floats) -> Floats:
@@ -291,18 +290,3 @@ def _over_midnight(mapped: Mapped, reading: Reading, time_s: Floats) -> Floats:
     counted = without_midnights(time_s, before_s[0] if before_s else np.nan)
     reading.note(_SAME_DATE)
     return counted
-
-
-def _of_time(text: str) -> str:
-    """Return the likely mistake behind a text that is no time."""
-    if (year := re.match(r"(\d{4})-\d\d", text.strip())) and not 1980 <= int(year[1]) <= 2099:
-        return "a wrong year; times of 1980 to 2099 are read"
-    if re.match(r"\d{1,2}[-/]\d{1,2}[-/]\d{2,4}", text.strip()):
-        return "day or month first? Write 2021-03-04, or 4.3.2021 with dots"
-    if re.match(r"\d{1,2}[-. ][^\W\d_]{3,}\.?[-. ]\d{4}", text.strip()):
-        return "a month that is not named in English; write 2026-05-01T10:00:00"
-    if re.match(r"\d{1,2}:\d\d", text.strip()):
-        return "a time of day without its date; write 2026-05-01T08:00:00, or seconds"
-    if re.search(r"\d\s?[ap]\.?m\.?$", text.strip(), re.IGNORECASE):
-        return "AM and PM go with hours of 1 to 12; write 2026-05-01T14:00:00"
-    return ""

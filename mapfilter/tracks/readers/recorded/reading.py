@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
@@ -42,11 +42,12 @@ class Reading(Remarks):
     ``last_s`` is the last time of the file's rows, used or not, and ``passed_s`` that of the parts
     read so far, of formats without ``last_s``; ``columns`` are the names in the file of columns
     without a usual name, by field. ``doubled`` is by how much all times so far may be later, as of
-    :func:`mapfilter.tracks.readers.clocks.local_times.doubled_s`, and the note on it; ``by_zone``
-    whether any of them is UTC by the zone that was given; ``date_order`` whether dates with the
-    year at the end begin with "day" or "month", as one of them shows, or the order of dates of
-    digits; ``value_units`` the units behind the values of columns. ``kept`` are rows that
-    ``ending`` takes when all parts are read.
+    :func:`mapfilter.clocks.local_times.doubled_s`, and the note on it; ``by_zone`` whether any of
+    them is UTC by the zone that was given; ``date_order`` whether dates with the year at the end,
+    or in two digits, begin with "day", "month" or "year", as one of them shows, or the order of
+    dates of digits, and ``date_column`` the column of dates beside times of day; ``later`` gives
+    the columns of the parts after the one that is read; ``value_units`` the units behind the values
+    of columns. ``kept`` are rows that ``ending`` takes when all parts are read.
     """
 
     path: Path
@@ -66,6 +67,8 @@ class Reading(Remarks):
     doubled: tuple[float, str] = (0.0, "")
     by_zone: bool = False
     date_order: str = ""
+    date_column: str = ""
+    later: Callable[[], Iterable[Any]] = tuple
     value_units: dict[str, str] = field(default_factory=dict)
     columns: dict[str, str] = field(default_factory=dict)
     kept: list[pd.DataFrame] = field(default_factory=list)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import nan
@@ -13,16 +13,10 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from mapfilter._types import Bools, Floats, Ints
+from mapfilter.clocks.local_times import is_beside_change
+from mapfilter.clocks.times import parse_times, seconds_of_day
+from mapfilter.clocks.written_times import written_times
 from mapfilter.tracks.readers.clocks.local_parts import note_changes
-from mapfilter.tracks.readers.clocks.local_times import is_beside_change
-from mapfilter.tracks.readers.clocks.plain_times import plain_times
-from mapfilter.tracks.readers.clocks.times import (
-    LEAST_UNIX_S,
-    parse_times,
-    seconds_of_day,
-    unix_seconds,
-)
-from mapfilter.tracks.readers.clocks.written_dates import are_compact, order_of, with_year_first
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.texts.numbers import DIGIT, read_numbers, read_whole_numbers
 
@@ -114,35 +108,25 @@ class Columns:
     def _times(
         self, names: Sequence[str], zone: str, layout: str, after_s: float
     ) -> tuple[Floats, bool]:
-        rows = self
+        rows, reading = self, self.reading
         if self.decimal_comma and layout == "ISO8601":
             rows = self.rewritten(r"^(\s*\d+),(\d+\s*)$", r"\1.\2", *names)
         column = rows._raw(*names)
         if column is None:
             return parse_times(rows.texts(*names), zone, layout, after_s)
-        if layout == "ISO8601":
-            try:
-                number = np.asarray(pc.cast(column, pa.float64()).to_numpy(), dtype=np.float64)
-            except pa.ArrowInvalid:
-                pass
-            else:
-                if not are_compact(number):
-                    unix = np.where(np.abs(number) > LEAST_UNIX_S, number, np.nan)
-                    return unix_seconds(unix), True
-        if (found := plain_times(column, zone, layout, after_s)) is not None:
-            return found
-        if layout == "ISO8601":
-            rows = rows._with_year_first(column, names)
-        return parse_times(rows.texts(*names), zone, layout, after_s)
+        later = partial(self._later, self.find(*names) or "")
+        found = written_times(column, zone, layout, after_s, reading.date_order, later)
+        reading.date_order = found.order or reading.date_order
+        for note in found.notes:
+            reading.note(note)
+        return found.time_s, found.zoned
 
-    def _with_year_first(self, column: pa.ChunkedArray, names: Sequence[str]) -> Columns:
-        """Return columns with a column of times in the order of ISO 8601; note another one."""
-        reading, name = self.reading, self.find(*names) or ""
-        if reading.date_order not in ("day", "month") and (order := order_of(column)):
-            reading.date_order = order
-            reading.note(f"time: the {order} first in dates with slashes or hyphens")
-        ordered = with_year_first(column, reading.date_order)
-        return replace(self, _columns={**self._columns, self.names.index(name): ordered})
+    def _later(self, name: str) -> Iterator[pa.ChunkedArray]:
+        """Yield a column of times, or of their dates, of later parts of the file."""
+        for rows in self.reading.later():
+            column = rows._raw(*filter(None, (self.reading.date_column, name)))
+            if column is not None:
+                yield column
 
     def times_of_part(
         self, *names: str, zone: str = "", layout: str = "ISO8601"
@@ -233,6 +217,12 @@ class Columns:
         """Return columns of which one has other texts."""
         column = pa.chunked_array([pa.array(texts, pa.string())])
         return replace(self, _columns={**self._columns, self.names.index(name): column})
+
+    def with_column(self, name: str, text: str) -> Columns:
+        """Return columns with another one, which has the same text in each row."""
+        column = pa.chunked_array([pa.repeat(text, len(self))])
+        columns = {**self._columns, len(self.names): column}
+        return replace(self, names=(*self.names, name), _columns=columns)
 
     def number(self, *names: str) -> Floats:
         """Return the first of these columns that is there as numbers, NaN where missing.

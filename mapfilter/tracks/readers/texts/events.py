@@ -15,7 +15,7 @@ import pyarrow.compute as pc
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Bools, Floats, Ints
-from mapfilter.tracks.readers.clocks.times import seconds_of_day, without_midnights
+from mapfilter.clocks.times import seconds_of_day, without_midnights
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.texts.columns import Columns
 from mapfilter.tracks.readers.texts.lines import LONGEST_LINE, blocks, line_texts

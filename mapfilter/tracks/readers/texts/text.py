@@ -58,12 +58,15 @@ class Text:
         What was changed to make it so.
     line : int
         Number of the first line; for a part of a file, one less than that of its first row.
+    made_of : str
+        What the file held in another form, such as "JSON"; "" for a text as it is.
     """
 
     path: Path
     data: bytes = field(repr=False)
     notes: tuple[str, ...] = ()
     line: int = 1
+    made_of: str = ""
 
     @cached_property
     def head(self) -> tuple[str, ...]:

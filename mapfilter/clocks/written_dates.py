@@ -7,11 +7,14 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from mapfilter._types import Floats
-from mapfilter.tracks.readers.clocks.times import LEAST_UNIX_S
+from mapfilter.clocks.times import LEAST_UNIX_S
 
 _COMPACT = r"^((?:19|20)\d\d)(\d\d)(\d\d)(\d\d)(\d\d)(\d\d)"
 """A date and a time in one number, such as 20260501101530, with milliseconds or without."""
+_COMPACT_MINUTES = r"^((?:19|20)\d\d)(\d\d)(\d\d)(\d\d)(\d\d)"
 _COMPACT_RANGES = ((1.9e13, 2.1e13, 1.0), (1.9e16, 2.1e16, 1e3))
+_MINUTES = (1.9e11, 2.1e11)
+"""Numbers of a date, an hour and a minute, such as 202605011015."""
 _PARTS = ((0, 60), (0, 59), (0, 23), (1, 31), (1, 12))
 """Seconds, minutes, hours, days and months: the least and the largest."""
 _LEAST_TIMES = 0.5
@@ -27,16 +30,29 @@ _REWRITTEN = (
     (r"^(\d{1,4}[/-]\d\d?[/-]\d{1,4}),?\s+", r"\1 "),
     # A zone's name after its offset, as Java writes it.
     (r"(Z|[+-]\d\d:?\d\d)\[[\w/+-]+\]$", r"\1"),
+    # A date and a time of day without separators, with one between both.
+    (r"^((?:19|20)\d\d)(\d\d)(\d\d)[ _-](\d\d):?(\d\d):?(\d\d)", r"\1-\2-\3 \4:\5:\6"),
+    # As names of files have them.
+    (
+        r"^((?:19|20)\d\d)([.-]\d\d)([.-]\d\d)[ T_-](\d\d)([-._])(\d\d)[-._](\d\d)",
+        r"\1\2\3 \4:\6:\7",
+    ),
+    (r"^((?:19|20)\d\d)[./](\d\d?)[./](\d\d?)", r"\1-\2-\3"),
+    (r"^(\d{4}-\d\d?-\d\d?)_", r"\1 "),
+    # The month first, by its name.
+    (r"^([A-Z][a-z]{2})[a-z]*\.?\s+(\d\d?),?\s+(\d{4}),?\s+", r"\2-\1-\3 "),
     # Java's Date.toString(), such as Fri May 01 10:00:00 GMT+02:00 2026; and a date of mails.
     (rf"{_DAY} (?:GMT|UTC)([+-]\S+) (\d{{4}})$", r"\2-\1-\5 \3\4"),
     (rf"{_DAY} (?:GMT|UTC) (\d{{4}})$", r"\2-\1-\4 \3Z"),
     (rf"{_DAY} (\d{{4}})$", r"\2-\1-\4 \3"),
+    (rf"{_DAY} ([A-Z]{{3,5}}) (\d{{4}})$", r"\2-\1-\5 \3 \4"),
     # A browser's, such as Fri May 01 2026 10:00:00 GMT+0200 (CEST).
     (
         rf"{_DAY_OF_WEEK}(\w{{3}}) (\d\d) (\d{{4}}) ({_CLOCK}) GMT([+-]\d{{4}})(?: \(.*\))?$",
         r"\2-\1-\3 \4\5",
     ),
     (rf"{_DAY_OF_WEEK}(\d\d? \w{{3}} \d{{4}} {_CLOCK})", r"\1"),
+    (rf"{_COMPACT_MINUTES}$", r"\1-\2-\3 \4:\5"),
     (rf"{_COMPACT}{_ZONE}$", r"\1-\2-\3 \4:\5:\6\7"),
     (rf"{_COMPACT}(?:\.?(\d{{3}})|\.(\d{{1,9}})){_ZONE}$", r"\1-\2-\3 \4:\5:\6.\7\8\9"),
 )
@@ -63,6 +79,13 @@ def are_compact(numbers: Floats) -> bool:
             rest, part = np.divmod(rest, 100.0)
             good &= (part >= least) & (part <= most)
         count += int(np.count_nonzero(good))
+    low, high = _MINUTES
+    rest = numbers[(numbers >= low) & (numbers < high)]
+    good = rest == np.floor(rest)
+    for least, most in _PARTS[1:]:
+        rest, part = np.divmod(rest, 100.0)
+        good &= (part >= least) & (part <= most)
+    count += int(np.count_nonzero(good))
     return bool(count > _LEAST_TIMES * np.count_nonzero(numbers >= LEAST_UNIX_S))
 
 
@@ -90,6 +113,17 @@ def order_of(column: pa.ChunkedArray) -> str:
     if late["first"] == late["second"]:
         return ""
     return "day" if late["first"] else "month"
+
+
+def has_year_last(column: pa.ChunkedArray) -> bool:
+    """Return whether some dates have slashes or hyphens, and the year at the end.
+
+    Examples
+    --------
+    >>> has_year_last(pa.chunked_array([["2026-05-01", "1/5/2026"]]))
+    True
+    """
+    return bool(pc.any(pc.match_substring_regex(column, _YEAR_LAST)).as_py())
 
 
 def with_year_first(column: pa.ChunkedArray, order: str) -> pa.ChunkedArray:

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 
 from mapfilter._constants import DAY_S, GPS_EPOCH_S
 from mapfilter._types import Floats
+from mapfilter.clocks.local_times import utc_from_local_s
 from mapfilter.gnss.almanacs import WEEK_S
 from mapfilter.gnss.orbits import LEAPS_UTC_S
-from mapfilter.tracks.readers.clocks.local_times import utc_from_local_s
 
 _DAYS, _NEAREST_S = (36_526.0, 73_050.0), 1e-3
 """Days of the years 2000 to 2099 since 1900, and rows a thousand a second."""

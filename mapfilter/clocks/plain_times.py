@@ -7,7 +7,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from mapfilter._types import Floats
-from mapfilter.tracks.readers.clocks.local_times import utc_from_local_s
+from mapfilter.clocks.local_times import utc_from_local_s
 
 _EARLIEST_S, _LATEST_S = -2_208_988_800.0, 4_102_444_800.0
 """The years 1900 to 2099."""
@@ -18,14 +18,14 @@ def plain_times(
 ) -> tuple[Floats, bool] | None:
     """Return times that are all of one plain layout, all of them with a zone or none; else None.
 
-    It gives what :func:`mapfilter.tracks.readers.clocks.times.parse_times` does, in a tenth of its
+    It gives what :func:`mapfilter.clocks.times.parse_times` does, in a tenth of its
     time.
 
     Parameters
     ----------
     column : pyarrow.ChunkedArray of str
     zone, layout, after_s
-        As of :func:`mapfilter.tracks.readers.clocks.times.parse_times`.
+        As of :func:`mapfilter.clocks.times.parse_times`.
 
     Returns
     -------

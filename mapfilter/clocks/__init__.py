@@ -1,0 +1,1 @@
+"""Times as programs write them, in UTC seconds: of recordings and of drive tests."""

@@ -1,0 +1,79 @@
+"""Records as the text of a CSV, which the readers of CSV read."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from mapfilter._words import number_of
+from mapfilter.tracks.readers.texts.text import Text
+
+Path_ = tuple[str, ...]
+"""Names from the outermost object to a value."""
+
+
+def as_table(text: Text, header: Sequence[str], rows: Iterable[Sequence[str]], what: str) -> Text:
+    """Return a text of CSV with a note on what its lines are of.
+
+    Parameters
+    ----------
+    text : Text
+        The file.
+    header : sequence of str
+    rows : iterable of sequence of str
+    what : str
+        What each row was, such as "JSON: 1 record".
+    """
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(header)
+    count = 0
+    for row in rows:
+        writer.writerow([_on_a_line(value) for value in row])
+        count += 1
+    note = f"{what} read as a table of {number_of(count, 'row')} (lines 2, 3, …)"
+    data, notes = stream.getvalue().encode(), (*text.notes, note)
+    return replace(text, data=data, notes=notes, line=1, made_of=what)
+
+
+def names_of(paths: Sequence[Path_]) -> dict[Path_, str]:
+    """Return names of columns: the last names of paths, all names where several end alike.
+
+    Examples
+    --------
+    >>> list(names_of([("time",), ("gps", "lat"), ("a", "x"), ("b", "x")]).values())
+    ['time', 'lat', 'a.x', 'b.x']
+    """
+    count = Counter(path[-1].lower() for path in paths)
+    return {path: path[-1] if count[path[-1].lower()] == 1 else ".".join(path) for path in paths}
+
+
+def table_of_records(text: Text, records: Sequence[Mapping[Path_, str]], what: str) -> Text:
+    """Return records of values by their paths as a text of CSV; see :func:`as_table`."""
+    paths = list(dict.fromkeys(path for record in records for path in record))
+    names = names_of(paths)
+    rows = ([record.get(path, "") for path in paths] for record in records)
+    return as_table(text, [names[path] for path in paths], rows, what)
+
+
+def written(value: Any) -> str:
+    """Return a value of JSON, or of a layer, as a CSV has it.
+
+    Examples
+    --------
+    >>> written(True), written(None), written(60.5), written(7)
+    ('true', '', '60.5', '7')
+    """
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return str(value)
+
+
+def _on_a_line(value: str) -> str:
+    return value.replace("\n", " ").replace("\r", " ")

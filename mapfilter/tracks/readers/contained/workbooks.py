@@ -1,0 +1,89 @@
+"""The first sheet of a workbook, and the layer of points of a GeoPackage, as CSV."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyogrio
+
+from mapfilter._ogr import sealed_gdal, vector_source
+from mapfilter.errors import InputError, fail
+from mapfilter.radio.tables import read_table
+from mapfilter.tracks.readers.contained.tables import as_table, written
+from mapfilter.tracks.readers.texts.text import Text
+
+_DEGREES = "EPSG:4326"
+
+
+def sheet_of(path: Path) -> Text:
+    """Return the first sheet of a workbook as a text of CSV.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, is empty, or too large.
+    """
+    table = read_table(path, "a recording")
+    width = len(table.header)
+    rows = ([*row[:width], *[""] * (width - len(row))] for _, row in table.rows)
+    notes = tuple(note.removeprefix(f"{path.name}: ") for note in table.notes)
+    return as_table(Text(path, b"", notes), table.header, rows, "workbook")
+
+
+def layer_of(path: Path, most_rows: int = -1) -> Text:
+    """Return the points of a GeoPackage's layer, with longitude and latitude, as a text of CSV.
+
+    ``most_rows`` are read at most, all of them where it is negative.
+
+    Raises
+    ------
+    InputError
+        It cannot be read, has several layers of points, or none.
+    """
+    source = vector_source(path)
+    try:
+        with sealed_gdal(), warnings.catch_warnings():
+            # GDAL warns of much that it copes with.
+            warnings.simplefilter("ignore", RuntimeWarning)
+            layers = [
+                str(name)
+                for name, kind in pyogrio.list_layers(source.path).tolist()
+                if kind is not None and "Point" in str(kind)
+            ]
+            if len(layers) != 1:
+                got = ", ".join(layers)[:200] or "none"
+                hint = "export the one of the journey as CSV, GPX or a GeoPackage of its own"
+                raise fail(InputError, str(path), "one layer of points", got, hint)
+            few = {} if most_rows < 0 else {"max_features": most_rows}
+            frame: Any = pyogrio.read_dataframe(source.path, layer=layers[0], **few)
+    except (RuntimeError, OSError, ValueError) as error:
+        got = str(error).partition(";")[0][:200].replace(f"'{path.absolute()}' ", "")
+        raise fail(InputError, str(path), "a GeoPackage that can be read", got) from error
+    if frame.crs is None:
+        raise fail(InputError, f"{path}, crs", "a CRS of the layer", "none")
+    frame = frame.to_crs(_DEGREES)
+    names = [name for name in frame.columns if name != frame.geometry.name]
+    lower = {name.lower() for name in names}
+    columns = [[written(_plain(value)) for value in frame[name]] for name in names]
+    points = frame.geometry
+    if not lower & {"lat", "latitude", "lat_deg"}:
+        names += ["longitude", "latitude"]
+        columns += [[_degrees(one) for one in axis] for axis in (points.x, points.y)]
+    rows = zip(*columns, strict=True)
+    return as_table(Text(path, b""), names, (list(row) for row in rows), f"layer {layers[0]}")
+
+
+def _plain(value: object) -> object:
+    """Return a value of a layer without the types of a data frame; None where it is missing."""
+    if value is None or value != value:
+        return None
+    if isinstance(value, np.generic):
+        return value.item()
+    return value
+
+
+def _degrees(value: float) -> str:
+    return f"{value:.9f}" if np.isfinite(value) else ""
