@@ -23,14 +23,11 @@ from mapfilter.filters.contract import (
     checked_estimate,
     checked_pair,
 )
-from mapfilter.positioning.epoch_checks import (
-    check_epoch,
-    check_generator,
-    check_later,
-    check_state_kind,
-)
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind
+from mapfilter.positioning.step_arguments import (
+    check_step,
+)
 from mapfilter.positioning.step_output import Fix, StepOutput, UnusedReading
 from mapfilter.tracks.schema import SERVING
 
@@ -121,10 +118,7 @@ class BeliefTracker(Filter[TrackState]):
             A value of the epoch is of another type or beyond its range, it is before the last one,
             the state is one of another filter, or ``rng`` is no generator.
         """
-        check_epoch(epoch)
-        check_state_kind(state, TrackState)
-        check_later(epoch, state.time_s)
-        check_generator(rng)
+        check_step(state, TrackState, epoch, rng)
         cell, reason, unused = self._serving(epoch)
         belief, status, count = state.belief, state.status, state.hypotheses
         if belief is None:

@@ -1,4 +1,4 @@
-"""What a program gives to a filter itself: epochs, and the state, kinds and generator beside them.
+"""Epochs that a program gives to a filter itself.
 
 Values of epochs have the types and ranges of a log's tables. Those of a log were checked when it
 was read; the test that all is well costs them little.
@@ -6,7 +6,7 @@ was read; the test that all is well costs them little.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import inf, isnan
 from typing import Any
@@ -17,7 +17,7 @@ from mapfilter._inputs import shown
 from mapfilter.errors import Faults, InputError, fail
 from mapfilter.filters.contract import MotionStep
 from mapfilter.positioning.epochs import Difference, Epoch, GnssFix, Pseudorange, ReportRow
-from mapfilter.tracks.schema import ALL_KINDS, NEIGHBOUR, PLACE, SCHEMA, SERVING, Column
+from mapfilter.tracks.schema import NEIGHBOUR, PLACE, SCHEMA, SERVING, Column
 
 _COLUMNS = {table: {column.name: column for column in columns} for table, columns in SCHEMA.items()}
 _TIME = SCHEMA["motion"][0]
@@ -96,50 +96,6 @@ _KINDS = {
 }
 
 
-def check_generator(rng: np.random.Generator) -> None:
-    """Check that random numbers come from a generator: of a seed each step would draw the same.
-
-    Raises
-    ------
-    InputError
-        They do not.
-    """
-    given: Any = rng
-    if not isinstance(given, np.random.Generator):
-        expected, hint = "a numpy.random.Generator", "numpy.random.default_rng(seed), once for all"
-        raise fail(InputError, "rng", expected, shown(given), hint)
-
-
-def check_state_kind(state: object, kind: type) -> None:
-    """Check that a state is one of the filter that it is given to.
-
-    Raises
-    ------
-    InputError
-        It is one of another filter, or none.
-    """
-    if not isinstance(state, kind):
-        expected = "a state of this filter, of begin or step"
-        raise fail(InputError, "state", expected, f"a {type(state).__name__}")
-
-
-def check_kinds_given(kinds: Collection[str]) -> None:
-    """Check the kinds of measurements that a journey records.
-
-    Raises
-    ------
-    InputError
-        They are no collection of texts, or one of them is no kind.
-    """
-    given: Any = kinds
-    wrong = [given]
-    if isinstance(given, Collection) and not isinstance(given, str):
-        wrong = [one for one in given if not (isinstance(one, str) and one in ALL_KINDS)]
-    if wrong:
-        expected = f"a collection of {', '.join(sorted(ALL_KINDS))}"
-        raise fail(InputError, "kinds", expected, ", ".join(map(shown, wrong)))
-
-
 def check_epoch(epoch: Epoch) -> None:
     """Check the values of an epoch: numbers in their ranges, or NaN where they were not measured.
 
@@ -164,25 +120,6 @@ def check_epoch(epoch: Epoch) -> None:
         if isinstance(row, Pseudorange):
             _check_place(f"{where}.place_m", row.place_m, faults)
     faults.raise_if_any(InputError)
-
-
-def check_later(epoch: Epoch, last_s: float) -> None:
-    """Check that an epoch is not before the one that a state is of.
-
-    Parameters
-    ----------
-    last_s : float
-        Time of the epoch before; NaN for none.
-
-    Raises
-    ------
-    InputError
-        It is before that.
-    """
-    if epoch.time_s < last_s:
-        expected = f"{last_s!r} or later, as the epoch before is of that time"
-        hint = "epochs out of order, or a clock that was set back; begin anew after a pause"
-        raise fail(InputError, "epoch, time_s", expected, repr(epoch.time_s), hint)
 
 
 def _is_well(epoch: Any) -> bool:

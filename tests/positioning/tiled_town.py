@@ -11,8 +11,6 @@ from mapfilter.positioning.bayes.sources.evidence import RadioReading
 from mapfilter.roads.lattice import RouteLattice
 
 EVERY_TILE = 10_000
-
-
 NONE = np.zeros(0, dtype=np.int32)
 
 

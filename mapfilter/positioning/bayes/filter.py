@@ -43,12 +43,7 @@ from mapfilter.positioning.bayes.state import BayesState, belief_here, check_sta
 from mapfilter.positioning.bayes.waiting import waits
 from mapfilter.positioning.bayes.warm_up import run_kernels
 from mapfilter.positioning.bayes.weighing import Weighing
-from mapfilter.positioning.epoch_checks import (
-    check_epoch,
-    check_generator,
-    check_kinds_given,
-    check_later,
-)
+from mapfilter.positioning.epoch_checks import check_epoch
 from mapfilter.positioning.epochs import Epoch, serving_cell
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Hypotheses, Kind
 from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
@@ -57,6 +52,7 @@ from mapfilter.positioning.known_start import check_start
 from mapfilter.positioning.sensors.pace import DRIVEN, Pace
 from mapfilter.positioning.sensors.undirected import UndirectedWay
 from mapfilter.positioning.sensors.watch import SensorWatch
+from mapfilter.positioning.step_arguments import check_generator, check_kinds_given, check_later
 from mapfilter.positioning.step_output import StepOutput, UnusedReading
 
 _LEAST_AT_START = 0.8

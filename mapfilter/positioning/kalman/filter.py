@@ -16,13 +16,6 @@ import numpy as np
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.filters.gaussian import METHODS, Method
 from mapfilter.models.state import MOVING
-from mapfilter.positioning.epoch_checks import (
-    check_epoch,
-    check_generator,
-    check_kinds_given,
-    check_later,
-    check_state_kind,
-)
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind, check_over
@@ -34,6 +27,10 @@ from mapfilter.positioning.kalman.place import place_of
 from mapfilter.positioning.kalman.reckoning import RECKONED
 from mapfilter.positioning.kalman.state import KalmanState
 from mapfilter.positioning.kalman.step import KalmanStep
+from mapfilter.positioning.step_arguments import (
+    check_kinds_given,
+    check_step,
+)
 from mapfilter.positioning.step_output import StepOutput
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
@@ -132,10 +129,7 @@ class KalmanTracker(Filter[KalmanState]):
             A value of the epoch is of another type or beyond its range, it is before the last one,
             the state is one of another filter, or ``rng`` is no generator.
         """
-        check_epoch(epoch)
-        check_state_kind(state, KalmanState)
-        check_later(epoch, state.time_s)
-        check_generator(rng)
+        check_step(state, KalmanState, epoch, rng)
         work = KalmanStep(self.sites, self.method, state)
         output = StepOutput(work.take(epoch), unused=tuple(work.unused))
         return work.state, output.protected(work.tail)
