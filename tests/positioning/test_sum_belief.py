@@ -264,3 +264,19 @@ def test_radii_are_those_of_the_mixture_about_its_mean():
     single = parts((5.0, 7.0))
     one_m, _ = gaussian_radii_m(COVARIANCE, 50.0)
     np.testing.assert_allclose(mixture_radii_m(single, [0, 1]), one_m, rtol=2e-5)
+
+
+def test_moments_of_one_part_are_those_of_the_sum_to_the_bit():
+    rng = np.random.default_rng(4)
+    for size in (2, 5, 7):
+        root = rng.normal(size=(size, size))
+        mean, covariance = rng.normal(0.0, 1e6, size), root @ root.T
+        mean[0] = covariance[0, 1] = covariance[1, 0] = -0.0
+        one = SumBelief(np.ones(1), mean[None], covariance[None], np.zeros(1, dtype=np.int64))
+        # A part of no weight does not count, and is no sum of one.
+        two = SumBelief(np.array([1.0, 0.0]), np.array([mean] * 2), np.array([covariance] * 2), [0])
+        for found, expected in (
+            (one.moments.mean, two.moments.mean),
+            (one.moments.covariance, two.moments.covariance),
+        ):
+            assert found.tobytes() == expected.tobytes()
