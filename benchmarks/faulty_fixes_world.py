@@ -222,10 +222,10 @@ def _fixes(
 
 
 def _both(rng: np.random.Generator, count: int, width: float) -> np.ndarray:
-    return _smooth(rng, count, width) + 1j * _smooth(rng, count, width)
+    return np.asarray(_smooth(rng, count, width) + 1j * _smooth(rng, count, width))
 
 
-def _smooth(rng: np.random.Generator, count: int, width: float) -> pd.DataFrame:
+def _smooth(rng: np.random.Generator, count: int, width: float) -> Floats:
     """Return noise of variance 1 that is smoothed over some samples."""
     wide = int(4 * width)
     found = gaussian_filter1d(rng.normal(size=count + 2 * wide), width)[wide : wide + count]

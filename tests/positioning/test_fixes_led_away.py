@@ -157,7 +157,7 @@ def coast(begun_s=0.0, place_m=(0.0, 0.0), sd_m=10.0, times=1.0):
 
 
 def compared(state, time_s, east_m, since_s=1.0, predicted_sd_m=10.0):
-    predicted = Gaussian(np.zeros(5), np.diag([predicted_sd_m**2, predicted_sd_m**2, 1, 1, 1]))
+    predicted = Gaussian(np.zeros(5), np.diag([*[predicted_sd_m**2] * 2, 1e-2, 1e-3, 1e-6]))
     place_m = np.array([east_m, 0.0])
     return state.compared(time_s, place_m, 9.0 * np.eye(2), predicted, since_s)
 
@@ -226,6 +226,22 @@ def test_a_belief_without_fixes_goes_where_steps_lead():
         np.testing.assert_array_equal(one.mean, [1, 2, 0, 0, 0])
         np.testing.assert_array_equal(np.diag(one.covariance), [104, 104, 0, 0, 0])
     assert Coasting().moved(motion, np.zeros(5)) == Coasting()
+
+
+def test_a_belief_whose_heading_is_hardly_known_contradicts_nothing():
+    """It is bent, and no normal one."""
+
+    def off_by(sd_rad):
+        one = coast()
+        covariance = one.covariance.copy()
+        covariance[2, 2] = sd_rad**2
+        return one._replace(covariance=covariance)
+
+    assert compared(Coasting(kept=(off_by(0.14),)), 60.0, 400.0).is_held
+    assert not compared(Coasting(kept=(off_by(0.16),)), 60.0, 400.0).is_held
+    for sd_rad, stays in ((0.49, True), (0.51, False)):
+        held = Coasting(apart=Separation(0.5, off_by(sd_rad)), is_held=True)
+        assert compared(held, 60.0, 400.0).is_held == stays
 
 
 def test_a_belief_without_fixes_keeps_headings_of_its_own():
