@@ -201,8 +201,8 @@ def test_only_vehicles_among_cells_may_have_speeds_with_another_scale_after_a_st
 
 
 def test_vehicles_are_taken_to_drive_before_their_speed_is_measured():
-    driven = BayesFilter(vehicle=True).over_area(make_area()).begin(("radio",)).watch
-    walked = BayesFilter().over_area(make_area()).begin(("radio",)).watch
+    driven = BayesFilter(vehicle=True).over_area(make_area()).begin(("serving",)).watch
+    walked = BayesFilter().over_area(make_area()).begin(("serving",)).watch
     assert (driven.pace.speed_mps, walked.pace.speed_mps) == (7.0, 1.4)
     assert driven.pace.rows == 0
     assert driven.has_motion is walked.has_motion
