@@ -27,7 +27,6 @@ from mapfilter.positioning.bayes.beliefs.moving import moved
 from mapfilter.positioning.bayes.beliefs.smoothing import BayesSmoother
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
 from mapfilter.positioning.bayes.claims import judged
-from mapfilter.positioning.bayes.clock_check import with_clocks_checked
 from mapfilter.positioning.bayes.doubted import doubted
 from mapfilter.positioning.bayes.maker import Maker
 from mapfilter.positioning.bayes.outputs import step_output
@@ -238,9 +237,6 @@ class BayesPositioner(Filter[BayesState]):
                     state = replace(state, belief=belief, status=status)
                 positioned = gnss_of(state).was_used(epoch.time_s)
                 state = judged(self.beliefs, state, weighed=used, positioned=positioned)
-        if not self.grid:
-            state, apart = with_clocks_checked(self.beliefs, state, updates, epoch.time_s)
-            unused += apart
         unused += doubted(self.beliefs, state, hold, epoch, unused, moves=motion is Reason.USED)
         gnss = gnss_of(state)
         if gnss.was_used(epoch.time_s):
