@@ -183,8 +183,9 @@ class BayesPositioner(Filter[BayesState]):
         least = max(self.options.split_mass, _LEAST_AT_START)
         status = Status.TRACKING if near > least else Status.SEARCHING
         belief, known = replace(belief, status=status), status is Status.TRACKING
-        watch = SensorWatch(undirected=UndirectedWay(since_m=0.0))
-        return replace(self.begin(), belief=belief, status=status, proven=known, watch=watch)
+        begun = self.begin()
+        watch = begun.watch._replace(undirected=UndirectedWay(since_m=0.0))
+        return replace(begun, belief=belief, status=status, proven=known, watch=watch)
 
     def step(
         self, state: BayesState, epoch: Epoch, rng: np.random.Generator
