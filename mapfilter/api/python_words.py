@@ -44,7 +44,8 @@ _SETTING = re.compile(
 _OPTIONS = {"bayes": "BayesFilter", "grid": "GridFilter", "kalman": "KalmanFilter"}
 _PLAN_LAYOUT = re.compile(r'\bcells\.layout = "(\w+)"')
 _PLAN_COLUMN = re.compile(r"\bcells\.columns\.(\w+)")
-_PLAN_DEFAULT = re.compile(r"\bcells\.([a-z]+_[a-z_]+)\b")
+_PLAN_DEFAULT = re.compile(r"(?<![\w./\\-])cells\.([a-z]+_[a-z_]+)\b(?!\.\w)")
+"""A setting, and no name of a file."""
 _RASTERS = 'rasters.resolution_m and rasters.resampling = "bilinear"'
 _OPENED = 'mf.open_rasters(…, resolution_m=…, resampling="bilinear")'
 

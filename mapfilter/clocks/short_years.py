@@ -22,6 +22,7 @@ _WITH_DOTS = ("day",)
 """Of dates with dots no one writes the month first, and next to no one a short year."""
 _FIRST_DAY, _LAST_DAY = np.datetime64("2016-01-01"), np.datetime64("2036-01-01")
 """Of dates with short years, which may be read in several orders."""
+_LAST_HOUR = 23
 SHORT_YEAR = "short year"
 """The order of dates that may be read in several orders."""
 
@@ -33,11 +34,11 @@ def short_order(column: pa.ChunkedArray) -> str:
     -------
     str
         "day", "month" or "year" where all dates are of 2016 to 2035 in that order alone, else
-        :data:`SHORT_YEAR`.
+        :data:`SHORT_YEAR`; dates with dots and nothing after them may be times of day.
 
     Examples
     --------
-    >>> [short_order(pa.chunked_array([[one]])) for one in ("13/05/26", "12.05.26", "05/13/26")]
+    >>> [short_order(pa.chunked_array([[one]])) for one in ("13/05/26", "31.05.26", "05/13/26")]
     ['day', 'day', 'month']
     >>> short_order(pa.chunked_array([["11/05/26 10:00:00"]]))
     'short year'
@@ -47,6 +48,8 @@ def short_order(column: pa.ChunkedArray) -> str:
     if not dates:
         return "day" if pc.any(pc.match_substring_regex(texts, _NAMED)).as_py() else ""
     dots = any(one[2] == "." for one in dates)
+    if dots and all(one[0] == one.string and int(one[1]) <= _LAST_HOUR for one in dates):
+        return SHORT_YEAR
     parts = [(int(one[1]), int(one[3]), int(one[4])) for one in dates]
     short = all(len(one[1]) == 2 for one in dates)
     orders = [

@@ -25,8 +25,8 @@ _TABLES = (".csv", ".txt", ".tsv", ".xlsx", ".xls", ".ods")
 _INDEX_COLUMN = b"TX_NAME"
 _LONGEST_LINE_BYTES = 1 << 16
 _LEAST_OF_PLAN = 2
-_OF_CELLS = (b"CellIdentity", b"+QENG:")
-"""In texts of Android's cells, and of a modem's replies."""
+_OF_MODEM = b"+QENG:"
+"""In replies of a modem with cells."""
 _PLACES = {"lat", "lon", "latitude", "longitude", "x", "y", "east", "north", "mcc", "mnc"}
 _PLAN = {name.casefold() for name in (*COLUMNS, *(n for names in ATOLL.values() for n in names))}
 _EXPECTED = "a database, raster, log, recording, map, layer, table or result"
@@ -131,11 +131,13 @@ def _file_info(path: Path) -> dict[str, Any]:
 
         load_config(path, [])
         return {"kind": "configuration", "use": f"mapfilter check -c {path.name}"}
+    from mapfilter.tracks.readers.contained.android_cells import is_of_cells
     from mapfilter.tracks.readers.formats import format_of
     from mapfilter.tracks.readers.texts.zipped import files_in_zip, is_zip
 
     # Texts of cells without times are refused with what they lack.
-    if format_of(path) is not None or any(mark in _beginning(path) for mark in _OF_CELLS):
+    begin = _beginning(path)
+    if format_of(path) is not None or _OF_MODEM in begin or is_of_cells(begin):
         return _recording_info(path)
     if is_zip(path):
         from mapfilter.tracks.zipped_logs import UNPACK, is_zipped_log

@@ -11,7 +11,8 @@ from mapfilter.tracks.readers.contained.tables import as_table
 from mapfilter.tracks.readers.texts.separated_values import likely_separator
 from mapfilter.tracks.readers.texts.text import Text
 
-_MARKS = ("CellIdentity", "CellSignalStrength")
+_MARK = re.compile(rb"Cell(?:Identity|SignalStrength)(?:Lte|Nr|Gsm|Wcdma|Tdscdma)\s?[:{=]")
+"""Not the name of a column alone."""
 _CELL = re.compile(r"CellIdentity(Lte|Nr|Gsm|Wcdma|Tdscdma)\b")
 _REGISTERED = re.compile(r"mRegistered\s?=\s?(YES|NO|true|false)", re.IGNORECASE)
 _VALUE = re.compile(r"\b(\w{1,30})\s?=\s?(-?\d{1,19}|0x[0-9a-fA-F]{1,8})\b")
@@ -46,7 +47,7 @@ _WITH_YEAR = (
 
 def has_android_cells(text: Text) -> bool:
     """Return whether a text holds cells, or their levels, as Android writes them."""
-    return any(mark.encode() in text.data[: 1 << 18] for mark in _MARKS)
+    return is_of_cells(text.data[: 1 << 18])
 
 
 def android_table(text: Text) -> Text:
@@ -57,12 +58,17 @@ def android_table(text: Text) -> Text:
     Raises
     ------
     InputError
-        Lines of a logcat have no time with a year.
+        Lines of a logcat have no time with a year, or a field is too long.
     """
     separator = likely_separator(text.first_line)
-    header = next(csv.reader([text.first_line], delimiter=separator), [])
-    if not _is_of_cells(text.first_line) and len(header) > 1:
-        return _of_columns(text, header, separator)
+    if not _is_of_cells(text.first_line):
+        try:
+            header = next(csv.reader([text.first_line], delimiter=separator), [])
+            if len(header) > 1:
+                return _of_columns(text, header, separator)
+        except csv.Error as error:
+            hint = "cut off, or a quotation mark without its second one"
+            raise fail(InputError, str(text.path), "rows of CSV", error, hint) from error
     lines = text.data.decode("utf-8", "replace").splitlines()
     rows = [row for line in lines for row in _of_line(line)]
     if not rows:
@@ -106,8 +112,14 @@ def _of_columns(text: Text, header: Sequence[str], separator: str) -> Text:
     return as_table(text, (*(header[at] for at in others), *own), rows(), "cells of Android")
 
 
+def is_of_cells(data: bytes) -> bool:
+    """Return whether bytes hold a cell, or its level."""
+    return _MARK.search(data) is not None
+
+
 def _is_of_cells(text: str) -> bool:
-    return any(mark in text for mark in _MARKS)
+    # Most texts are none, and have no such word.
+    return "Cell" in text and is_of_cells(text.encode())
 
 
 def _cells(text: str) -> Iterator[list[str]]:

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import json
 import re
-from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections import Counter, deque
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
-from mapfilter.tracks.readers.contained.tables import Path_, table_of_records, written
+from mapfilter.tracks.readers.contained.tables import (
+    MOST_COLUMNS,
+    MOST_VALUES,
+    Path_,
+    table_of_records,
+    written,
+)
 from mapfilter.tracks.readers.texts.text import Text
 
 _BEGINS = re.compile(rb"\s*(?:\[\s*)?\{\s*(?:\"|\})")
@@ -20,13 +26,14 @@ _LINE_BEGINS = re.compile(rb"[^{}\[\]\"\n]{1,80}\{\"")
 _LIST = re.compile(r"\"(\w{1,40})\"\s{0,20}:\s{0,20}\[\s{0,40}(?=\{)")
 _BLANK = re.compile(r"[\s,]*")
 _LARGEST_BYTES = 1 << 28
-_DEEPEST, _MOST_COLUMNS = 8, 1000
+_DEEPEST = 8
 _OF_KINDS: Mapping[str, tuple[str, ...]] = {"class": ("TPV",), "_type": ("location",)}
 """Names by which programs tell their kinds of records (gpsd, OwnTracks), and the kinds to read."""
 _CRS = re.compile(
     r"\"crs\"\s{0,9}:\s{0,9}\{[^{}]{0,99}\{[^{}]{0,99}?\"name\"\s{0,9}:\s{0,9}\"([^\"]{0,99})"
 )
 _OF_ESTIMATES = {"filter", "status", "radius_95_m"}
+_DAMAGED = "the file is cut off or damaged; whole records were read"
 _OF_DEGREES = re.compile(r"CRS84|EPSG:{1,2}4326|OGC:1\.3:CRS84", re.IGNORECASE)
 
 
@@ -48,89 +55,107 @@ def json_table(text: Text) -> Text | None:
     if len(text.data) > _LARGEST_BYTES:
         got = f"{len(text.data) >> 20} MiB"
         raise fail(InputError, str(text.path), "JSON of at most 256 MiB", got, "export CSV")
-    records, cut = _records(text.data.decode("utf-8", "replace"))
+    records, notes = _records(text.data.decode("utf-8", "replace"))
     records = [record for record in records if isinstance(record, dict)]
     if not records:
         return None
     _check_crs(text)
     records, left = _of_kind(records)
-    rows = [row for record in records for row in _rows(_with_place(record), text)]
-    if not any(rows):
+    rows: list[dict[Path_, str]] = []
+    most, paths = MOST_VALUES, dict[Path_, Path_]()
+    records.reverse()
+    while records:
+        # Records and rows of a large file need not be in memory at the same time.
+        made = _rows(_with_place(records.pop()), text, most)
+        most -= sum(map(len, made))
+        rows += ({paths.setdefault(at, at): value for at, value in row.items()} for row in made)
+    # An object of thousands of names holds objects by their ids, or is of settings.
+    if not any(rows) or (len(rows) == 1 and len(rows[0]) > MOST_COLUMNS):
         return None
     if {path[-1] for row in rows for path in row} >= _OF_ESTIMATES:
         hint = "what a filter estimated; it is no recording, nor a ground truth"
         raise fail(InputError, str(text.path), "a recording", "an estimate of mapfilter", hint)
-    notes = [
+    notes += [
         f"{number_of(n, f'record of {kind}', f'records of {kind}')} left out" for kind, n in left
     ]
-    notes += ["the file is cut off or damaged; whole records were read"] if cut else []
     return table_of_records(replace(text, notes=(*text.notes, *notes)), rows, "JSON")
 
 
-def _records(content: str) -> tuple[list[Any], bool]:
-    """Return the objects of a text, and whether it is cut off or damaged."""
-    decoder = json.JSONDecoder()
+def _records(content: str) -> tuple[list[Any], list[str]]:
+    """Return the objects of a text, and notes on what was left out."""
+    # A table has the digits of numbers as they are.
+    decoder = json.JSONDecoder(parse_float=str, parse_int=str)
     begin = content.lstrip()
-    if not begin.startswith("["):
-        objects, whole = _of_lines(content, decoder)
-        if len(objects) > 1 or (objects and not _lists(objects[0])):
-            return objects, not whole
-        if objects:
-            return _lists(objects[0]), False
-        # An object over many lines, the end of which may be missing.
-        try:
-            found, _ = decoder.raw_decode(begin)
-            return (_lists(found) or [found]) if isinstance(found, dict) else [], False
-        except (ValueError, RecursionError):
-            inner = _LIST.search(content)
-            if inner is None:
-                return [], True
-            return list(_items(content, inner.end(), decoder)), True
-    at = content.index("[") + 1
-    items = list(_items(content, at, decoder))
-    return items, not content.rstrip().endswith("]")
+    if begin.startswith("["):
+        items, at = _items(begin, 1, decoder)
+        return items, [] if begin[at:].strip() == "]" else [_DAMAGED]
+    objects, whole = _of_lines(begin, decoder)
+    if not objects:
+        # Objects over many lines each, the last of which may be cut off.
+        items, at = _items(begin, 0, decoder)
+        objects, whole = [one for one in items if isinstance(one, dict)], at == len(begin)
+    notes = [] if whole else [_DAMAGED]
+    if len(objects) == 1:
+        inner, left = _list_in(objects[0])
+        return (inner, [*notes, *left]) if inner else (objects, notes)
+    if not objects and (found := _LIST.search(begin)):
+        return _items(begin, found.end(), decoder)[0], [_DAMAGED]
+    return objects, notes
 
 
 def _of_lines(content: str, decoder: json.JSONDecoder) -> tuple[list[Any], bool]:
-    """Return the objects of lines that are one each, or end in one; other lines are damaged."""
-    found, whole = [], True
-    for line in content.splitlines():
+    """Return the objects of lines that hold some, or end in some; other lines are damaged."""
+    found: list[Any] = []
+    whole = True
+    for line in content.split("\n"):
         at = line.find("{")
-        if at < 0:
-            whole &= not line.strip()
-            continue
-        try:
-            value, _ = decoder.raw_decode(line, at)
+        whole &= at >= 0 or not line.strip()
+        while at >= 0:
+            try:
+                value, at = decoder.raw_decode(line, at)
+            except (ValueError, RecursionError):
+                whole = False
+                if not found:
+                    return [], False
+                break
             found.append(value)
-        except (ValueError, RecursionError):
-            whole = False
-            if not found:
-                return [], False
+            at = _after_blanks(line, at)
+            whole &= line.startswith("{", at) or at == len(line)
+            at = line.find("{", at, at + 1)
     return found, whole
 
 
-def _items(content: str, at: int, decoder: json.JSONDecoder) -> Iterator[Any]:
-    """Yield the items of a list until its end, or until damage."""
+def _items(content: str, at: int, decoder: json.JSONDecoder) -> tuple[list[Any], int]:
+    """Return values until the end of a list or of the text, or until damage, and where that is."""
+    found: list[Any] = []
     while True:
-        found = _BLANK.match(content, at)
-        at = found.end() if found else at
+        at = _after_blanks(content, at)
         if at >= len(content) or content[at] == "]":
-            return
+            return found, at
         try:
             value, at = decoder.raw_decode(content, at)
         except (ValueError, RecursionError):
-            return
-        yield value
+            return found, at
+        found.append(value)
 
 
-def _lists(record: Mapping[str, Any]) -> list[Any]:
-    """Return the longest list of objects in an object that is no record itself; else none."""
-    lists = [
-        value
-        for value in record.values()
+def _after_blanks(content: str, at: int) -> int:
+    found = _BLANK.match(content, at)
+    return found.end() if found else at
+
+
+def _list_in(record: Mapping[str, Any]) -> tuple[list[Any], list[str]]:
+    """Return the longest list of objects in an object, and notes on others; else none."""
+    lists = {
+        name: value
+        for name, value in record.items()
         if isinstance(value, list) and value and isinstance(value[0], dict)
+    }
+    longest = max(lists, key=lambda name: len(lists[name]), default="")
+    return lists.pop(longest, []), [
+        f"{name[:40]}: {number_of(len(value), 'object')} left out; {longest[:40]} is longer"
+        for name, value in lists.items()
     ]
-    return max(lists, key=len, default=[])
 
 
 def _check_crs(text: Text) -> None:
@@ -169,26 +194,36 @@ def _with_place(record: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _rows(record: Mapping[str, Any], text: Text) -> list[dict[Path_, str]]:
-    """Return a record's values by their paths, once for each object of a list within it."""
+def _rows(
+    record: Mapping[str, Any], text: Text, most: int, above: int = 0
+) -> list[dict[Path_, str]]:
+    """Return a record's values by their paths, once for each object of a list within it.
+
+    ``most`` values may be in them, and ``above`` names led to the record.
+    """
     own: dict[Path_, str] = {}
     lists: list[tuple[Path_, list[Any]]] = []
-    todo: list[tuple[Path_, Any]] = [((str(name),), value) for name, value in record.items()]
+    todo = deque[tuple[Path_, Any]](((str(name),), value) for name, value in record.items())
     while todo:
-        path, value = todo.pop(0)
-        if len(path) > _DEEPEST:
-            raise fail(InputError, str(text.path), "records of few levels", "JSON nested deeper")
+        path, value = todo.popleft()
+        if above + len(path) > _DEEPEST:
+            hint = "export the positions and cells alone"
+            expected = f"records of at most {_DEEPEST} levels"
+            raise fail(InputError, str(text.path), expected, "JSON nested deeper", hint)
         if isinstance(value, dict):
             todo += [((*path, str(name)), inner) for name, inner in value.items()]
         elif isinstance(value, list):
             lists += [(path, value)] if value and isinstance(value[0], dict) else []
         else:
             own[path] = written(value)
-    rows = [
-        {**own, **{(*path, *inner): value for inner, value in row.items()}}
-        for path, items in lists
-        for item in items
-        if isinstance(item, dict)
-        for row in _rows(item, text)
-    ]
+    rows: list[dict[Path_, str]] = []
+    for path, items in lists:
+        for item in items:
+            inner = _rows(item, text, most, above + len(path)) if isinstance(item, dict) else []
+            rows += [{**own, **{(*path, *at): v for at, v in row.items()}} for row in inner]
+            most -= sum(map(len, rows[len(rows) - len(inner) :]))
+            if most < 0:
+                hint = "export the positions and cells alone"
+                expected = "records of at most 5e7 values in all"
+                raise fail(InputError, str(text.path), expected, "more", hint)
     return rows or [own]

@@ -62,11 +62,17 @@ def _rows(lines: list[str]) -> Iterator[list[str]]:
         _, mark, reply = line.partition(MARK)
         if not (mark and time):
             continue
-        values = [
-            one.strip() for one in next(csv.reader([reply.strip()], skipinitialspace=True), [])
-        ]
-        if cell := _cell(values):
+        if cell := _cell(_values(reply)):
             yield [time, *cell]
+
+
+def _values(reply: str) -> list[str]:
+    """Return the values of a reply; none where it is damaged."""
+    try:
+        values = next(csv.reader([reply.strip()], skipinitialspace=True), [])
+    except csv.Error:
+        return []
+    return [one.strip() for one in values]
 
 
 def _cell(values: list[str]) -> list[str]:

@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 import pyogrio
+import shapely
 
 from mapfilter._ogr import sealed_gdal, vector_source
+from mapfilter._types import Floats
 from mapfilter.errors import InputError, fail
 from mapfilter.radio.tables import read_table
 from mapfilter.tracks.readers.contained.tables import as_table, written
 from mapfilter.tracks.readers.texts.text import Text
 
-_DEGREES = "EPSG:4326"
+_DEGREES, _MOST_ROWS = "EPSG:4326", 5_000_000
 
 
 def sheet_of(path: Path) -> Text:
@@ -41,7 +43,8 @@ def layer_of(path: Path, most_rows: int = -1) -> Text:
     Raises
     ------
     InputError
-        It cannot be read, has several layers of points, or none.
+        It cannot be read, has several layers of points, or none, or several points in a row, or a
+        CRS that is no part of the Earth.
     """
     source = vector_source(path)
     try:
@@ -57,23 +60,41 @@ def layer_of(path: Path, most_rows: int = -1) -> Text:
                 got = ", ".join(layers)[:200] or "none"
                 hint = "export the one of the journey as CSV, GPX or a GeoPackage of its own"
                 raise fail(InputError, str(path), "one layer of points", got, hint)
-            few = {} if most_rows < 0 else {"max_features": most_rows}
-            frame: Any = pyogrio.read_dataframe(source.path, layer=layers[0], **few)
+            # A layer may be a view without an end.
+            few = most_rows if most_rows >= 0 else _MOST_ROWS + 1
+            frame: Any = pyogrio.read_dataframe(source.path, layer=layers[0], max_features=few)
     except (RuntimeError, OSError, ValueError) as error:
         got = str(error).partition(";")[0][:200].replace(f"'{path.absolute()}' ", "")
         raise fail(InputError, str(path), "a GeoPackage that can be read", got) from error
-    if frame.crs is None:
-        raise fail(InputError, f"{path}, crs", "a CRS of the layer", "none")
-    frame = frame.to_crs(_DEGREES)
+    if len(frame) > _MOST_ROWS:
+        hint = "export parts of the journey"
+        raise fail(InputError, str(path), "a layer of at most 5e6 points", "more", hint)
+    points = _degrees_of(path, frame)
     names = [name for name in frame.columns if name != frame.geometry.name]
     lower = {name.lower() for name in names}
     columns = [[written(_plain(value)) for value in frame[name]] for name in names]
-    points = frame.geometry
     if not lower & {"lat", "latitude", "lat_deg"}:
         names += ["longitude", "latitude"]
-        columns += [[_degrees(one) for one in axis] for axis in (points.x, points.y)]
+        columns += [[_degrees(one) for one in axis] for axis in points]
     rows = zip(*columns, strict=True)
     return as_table(Text(path, b""), names, (list(row) for row in rows), f"layer {layers[0]}")
+
+
+def _degrees_of(path: Path, frame: Any) -> tuple[Floats, Floats]:
+    """Return longitudes and latitudes of a layer's points, NaN where there is none."""
+    where, hint = f"{path}, crs", "set the layer's CRS, or export it in WGS 84 (EPSG:4326)"
+    if frame.crs is None:
+        raise fail(InputError, where, "a CRS of the layer", "none", hint)
+    try:
+        geometry = frame.geometry.to_crs(_DEGREES).to_numpy()
+    except RuntimeError as error:
+        expected, got = "a CRS that leads to longitude and latitude", frame.crs.name[:100]
+        raise fail(InputError, where, expected, got, hint) from error
+    if (shapely.get_num_geometries(geometry) > 1).any():
+        hint = "make single points of it (Multipart to Singleparts in QGIS)"
+        raise fail(InputError, str(path), "one point in each row", "several in some", hint)
+    point = shapely.get_geometry(geometry, 0)
+    return shapely.get_x(point), shapely.get_y(point)
 
 
 def _plain(value: object) -> object:

@@ -10,10 +10,18 @@ from dataclasses import replace
 from typing import Any
 
 from mapfilter._words import number_of
+from mapfilter.errors import InputError, fail
 from mapfilter.tracks.readers.texts.text import Text
 
 Path_ = tuple[str, ...]
 """Names from the outermost object to a value."""
+MOST_VALUES = 50_000_000
+"""Of a table, blank ones included."""
+MOST_LETTERS = 1 << 30
+MOST_COLUMNS = 1000
+"""Of records, each of which may have names of its own."""
+A_TABLE = "a table of at most 5e7 values and 1 GiB of texts"
+SMALLER = "export the positions and cells alone, or parts of the journey"
 
 
 def as_table(text: Text, header: Sequence[str], rows: Iterable[Sequence[str]], what: str) -> Text:
@@ -27,17 +35,28 @@ def as_table(text: Text, header: Sequence[str], rows: Iterable[Sequence[str]], w
     rows : iterable of sequence of str
     what : str
         What each row was, such as "JSON: 1 record".
+
+    Raises
+    ------
+    InputError
+        The table is too large: a small file may hold one.
     """
-    stream = io.StringIO()
+    held = io.BytesIO()
+    # JSON may have halves of letters, which UTF-8 has not.
+    stream = io.TextIOWrapper(held, "utf-8", "replace", newline="")
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(header)
-    count = 0
+    writer.writerow([_on_a_line(name) for name in header])
+    count = letters = 0
     for row in rows:
         writer.writerow([_on_a_line(value) for value in row])
         count += 1
+        letters += sum(map(len, row))
+        if count * len(header) > MOST_VALUES or letters > MOST_LETTERS:
+            raise fail(InputError, str(text.path), A_TABLE, "a larger one", SMALLER)
     note = f"{what} read as a table of {number_of(count, 'row')} (lines 2, 3, …)"
-    data, notes = stream.getvalue().encode(), (*text.notes, note)
-    return replace(text, data=data, notes=notes, line=1, made_of=what)
+    stream.flush()
+    notes = (*text.notes, note)
+    return replace(text, data=held.getvalue(), notes=notes, line=1, made_of=what)
 
 
 def names_of(paths: Sequence[Path_]) -> dict[Path_, str]:
@@ -55,6 +74,9 @@ def names_of(paths: Sequence[Path_]) -> dict[Path_, str]:
 def table_of_records(text: Text, records: Sequence[Mapping[Path_, str]], what: str) -> Text:
     """Return records of values by their paths as a text of CSV; see :func:`as_table`."""
     paths = list(dict.fromkeys(path for record in records for path in record))
+    if len(paths) > MOST_COLUMNS:
+        expected, got = f"at most {MOST_COLUMNS} different names of values", f"{len(paths)}"
+        raise fail(InputError, str(text.path), expected, got, SMALLER)
     names = names_of(paths)
     rows = ([record.get(path, "") for path in paths] for record in records)
     return as_table(text, [names[path] for path in paths], rows, what)

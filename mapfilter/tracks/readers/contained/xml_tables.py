@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import html
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.tracks.readers.contained.tables import Path_, table_of_records
 from mapfilter.tracks.readers.texts.text import Text
 
 _PREFIX = re.compile(r"<(/?)[A-Za-z][A-Za-z0-9]{0,9}:")
 _WHEN, _COORD = re.compile(r"<when>([^<]*)</when>"), re.compile(r"<coord>([^<]*)</coord>")
+_EMPTY = re.compile(r"<(when|coord)\s{0,9}/>")
+"""Where a track has a time without a place, or a place without a time."""
 _DATA = re.compile(r"<Data\s+name=\"([^\"<>]{1,80})\"[^>]{0,200}>\s*<value>([^<]*)</value>")
 _SIMPLE = re.compile(r"<SimpleData\s+name=\"([^\"<>]{1,80})\"[^>]{0,200}>([^<]*)</SimpleData>")
 _PLACE = (("longitude",), ("latitude",), ("altitude_m",))
@@ -48,8 +51,11 @@ def kml_table(text: Text) -> Text:
     """
     content = _content(text, "KML")
     records: list[dict[Path_, str]] = []
+    uneven = 0
     for track in _elements(content, "Track"):
+        track = _EMPTY.sub(r"<\1></\1>", track)
         times, places = _WHEN.findall(track), _COORD.findall(track)
+        uneven += len(times) != len(places)
         for when, place in zip(times, places, strict=False):
             records.append({("time",): when.strip(), **_placed(place.split())})
     if not records:
@@ -64,6 +70,10 @@ def kml_table(text: Text) -> Text:
     if not records:
         hint = _LINE if "<LineString" in content else "export GPX, or a table as CSV"
         raise fail(InputError, str(text.path), "points with times", "KML without any", hint)
+    if uneven:
+        tracks = number_of(uneven, "track has", "tracks have")
+        note = f"{tracks} not as many times as places; taken in their order, one by one"
+        text = replace(text, notes=(*text.notes, note))
     if not content.rstrip().endswith("</kml>"):
         note = "the file is cut off or damaged; whole points were read"
         text = replace(text, notes=(*text.notes, note))
@@ -125,10 +135,23 @@ def gpx_table(text: Text) -> Text | None:
 
 
 def _content(text: Text, what: str) -> str:
-    """Return a text of XML without prefixes of its elements' names."""
+    """Return a text of XML without comments, and without prefixes of its elements' names."""
     if b"<!ENTITY" in text.data:
-        raise fail(InputError, str(text.path), f"{what} without entities", "<!ENTITY")
-    return _PREFIX.sub(r"<\1", text.data.decode("utf-8", "replace"))
+        hint = "delete its <!DOCTYPE …>, which no recording needs"
+        raise fail(InputError, str(text.path), f"{what} without entities", "<!ENTITY", hint)
+    content = text.data.decode("utf-8", "replace")
+    content = _without(content, "<![CDATA[", "]]>", html.escape)
+    return _PREFIX.sub(r"<\1", _without(content, "<!--", "-->", lambda _: ""))
+
+
+def _without(content: str, begin: str, end: str, instead: Callable[[str], str]) -> str:
+    """Return a text with other words for what stands between marks."""
+    first, *pieces = content.split(begin)
+    found = [first]
+    for piece in pieces:
+        inner, closed, rest = piece.partition(end)
+        found += [instead(inner), rest] if closed else []
+    return "".join(found)
 
 
 def _elements(content: str, name: str) -> Iterator[str]:
