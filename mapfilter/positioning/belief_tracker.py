@@ -25,9 +25,7 @@ from mapfilter.filters.contract import (
 )
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.filter import ALL_KINDS, Filter, Kind
-from mapfilter.positioning.step_arguments import (
-    check_step,
-)
+from mapfilter.positioning.step_arguments import check_step
 from mapfilter.positioning.step_output import Fix, StepOutput, UnusedReading
 from mapfilter.tracks.schema import SERVING
 

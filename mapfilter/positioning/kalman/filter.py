@@ -27,10 +27,7 @@ from mapfilter.positioning.kalman.place import place_of
 from mapfilter.positioning.kalman.reckoning import RECKONED
 from mapfilter.positioning.kalman.state import KalmanState
 from mapfilter.positioning.kalman.step import KalmanStep
-from mapfilter.positioning.step_arguments import (
-    check_kinds_given,
-    check_step,
-)
+from mapfilter.positioning.step_arguments import check_kinds_given, check_step
 from mapfilter.positioning.step_output import StepOutput
 from mapfilter.radio.antenna import MeasuredAntenna
 from mapfilter.radio.cells import CellPlan
