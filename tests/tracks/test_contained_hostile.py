@@ -1,6 +1,7 @@
 """Tables in other forms that are damaged, odd, or far larger than their files."""
 
 import json
+import zipfile
 
 import geopandas as gpd
 import numpy as np
@@ -11,6 +12,8 @@ import pytest
 from shapely.geometry import MultiPoint, Point
 
 from mapfilter.errors import InputError
+from mapfilter.tracks.joining.recordings import read_recordings
+from mapfilter.tracks.open_options import OpenOptions
 from mapfilter.tracks.readers.formats import read_recording
 
 START_S = 1_777_629_330
@@ -210,3 +213,12 @@ def test_times_of_day_with_dots_are_no_dates(tmp_path):
     rows = "".join(f"10.05.{at},50.8,4.3{at},-90\n" for at in range(16, 30))
     with pytest.raises(InputError, match=r"row 2, time: expected .*'10\.05\.16'"):
         read_recording(written(tmp_path, "own.csv", f"time,lat,lon,rsrp\n{rows}"))
+
+
+def test_what_the_only_file_of_a_zip_lacks_is_told(tmp_path):
+    path = tmp_path / "own.kmz"
+    line = "<LineString><coordinates>4,50 5,51</coordinates></LineString>"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("doc.kml", f"<kml><Placemark>{line}</Placemark></kml>")
+    with pytest.raises(InputError, match="likely: a line without times"):
+        read_recordings([path], OpenOptions())
