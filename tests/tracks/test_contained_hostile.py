@@ -222,3 +222,30 @@ def test_what_the_only_file_of_a_zip_lacks_is_told(tmp_path):
         archive.writestr("doc.kml", f"<kml><Placemark>{line}</Placemark></kml>")
     with pytest.raises(InputError, match="likely: a line without times"):
         read_recordings([path], OpenOptions())
+
+
+def test_a_workbook_of_opendocument_is_no_zip_of_recordings(tmp_path):
+    path = tmp_path / "own.ods"
+    names = ("office", "table", "text")
+    urn = "urn:oasis:names:tc:opendocument:xmlns"
+    spaces = " ".join(f'xmlns:{name}="{urn}:{name}:1.0"' for name in names)
+    cell = '<table:table-cell office:value-type="string"><text:p>{}</text:p></table:table-cell>'
+    rows = [["time", "lat", "lon"], *([START_S + at, 50 + at / 1000, 4.3] for at in range(5))]
+    lines = ("".join(map(cell.format, row)) for row in rows)
+    table = "".join(f"<table:table-row>{line}</table:table-row>" for line in lines)
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("mimetype", "application/vnd.oasis.opendocument.spreadsheet")
+        archive.writestr(
+            "content.xml",
+            f"<office:document-content {spaces}><office:body><office:spreadsheet>"
+            f'<table:table table:name="S">{table}</table:table>'
+            "</office:spreadsheet></office:body></office:document-content>",
+        )
+        archive.writestr(
+            "META-INF/manifest.xml",
+            f'<manifest:manifest xmlns:manifest="{urn}:manifest:1.0">'
+            '<manifest:file-entry manifest:full-path="/" manifest:media-type=""/>'
+            "</manifest:manifest>",
+        )
+    found, _ = read_recordings([path], OpenOptions())
+    assert len(found[0].tables["positions"]) == 5
