@@ -67,7 +67,6 @@ class Reason(StrEnum):
     OTHER_UNIT = "other_unit"
     DELIVERED_TWICE = "delivered_twice"
     STALE_RADIO = "stale_radio"
-    CLOCKS_APART = "clocks_apart"
     NOT_STARTED = "not_started"
     NOT_USED_BY_FILTER = "not_used_by_filter"
     AMBIGUOUS_CELL = "ambiguous_cell"

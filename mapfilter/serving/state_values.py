@@ -17,12 +17,11 @@ import numpy as np
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.hypotheses import BeliefSummary, Bins
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.models.level_errors import LevelErrors, LevelReport
+from mapfilter.models.level_errors import LevelErrors
 from mapfilter.models.level_memory import LevelMemory
 from mapfilter.positioning.bayes.beliefs.legs import Lead, Leg
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.certainty import Recovery
-from mapfilter.positioning.bayes.clocks import Clocks, HeldReport
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, NullHypothesis
 from mapfilter.positioning.bayes.rivals.half_turns import HalfTurns
 from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
@@ -57,7 +56,6 @@ _CLASSES: dict[str, type] = {
         BeliefSummary,
         Biases,
         Bins,
-        Clocks,
         Contradiction,
         DeadReckoning,
         DifferenceErrors,
@@ -69,13 +67,11 @@ _CLASSES: dict[str, type] = {
         GnssState,
         HalfTurns,
         HeldOtherwise,
-        HeldReport,
         Hold,
         Lead,
         Leg,
         LevelErrors,
         LevelMemory,
-        LevelReport,
         MirroredTwin,
         MotionRepeats,
         MotionStep,

@@ -26,7 +26,6 @@ REASONS: Mapping[Reason, str] = {
     Reason.OTHER_UNIT: "lengths of steps are read in another unit from here on",
     Reason.DELIVERED_TWICE: "the same rows of motion were delivered again",
     Reason.STALE_RADIO: "the modem repeats an old report",
-    Reason.CLOCKS_APART: "reports fit positions of another time: clocks may differ",
     Reason.NOT_STARTED: "came before the first reading that the filter can start from",
     Reason.NOT_USED_BY_FILTER: "this filter does not use readings of this kind",
     Reason.AMBIGUOUS_CELL: "several cells of the database fit",

@@ -59,7 +59,7 @@ def done(one):
 def test_motion(step_m, more, rows):
     p, key = Particles(COUNT), np.uint64(2**63 + 11)
     state = np.vstack([p.state[:8], p.state[:more] - 7.0])
-    errors = MotionErrors(disturbances_per_m=0.3, rate_rad_per_m=0.02)
+    errors = MotionErrors(disturbances_per_m=0.3, rate_rad_per_m=0.02, rescales_per_m=0.3)
     found = np.full_like(state, nan)
     cuda_motion.move(state, step_m, 2.5, errors, key, found, 0.2, rows)
     expected = move(state, step_m, 2.5, errors, key, 0.2, rows)

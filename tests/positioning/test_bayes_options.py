@@ -205,6 +205,9 @@ def test_vehicles_are_taken_to_drive_before_their_speed_is_measured():
     walked = BayesFilter().over_area(make_area()).begin(("serving",)).watch
     assert (driven.pace.speed_mps, walked.pace.speed_mps) == (7.0, 1.4)
     assert driven.pace.rows == 0
+    positioner, rng = BayesFilter(vehicle=True).over_area(make_area()), np.random.default_rng(1)
+    begun = positioner.begin_at(*LATTICE.east_north(4, 3), 5.0, rng)
+    assert begun.watch.pace == driven.pace
     assert driven.has_motion is walked.has_motion
 
 

@@ -36,7 +36,6 @@ def state(belief, status=Status.TRACKING, reported=None):
         null=null,
         reported=reported,
         leg=NO_LEG,
-        clocks=None,
         with_output=lambda one: one,
     )
 

@@ -27,7 +27,6 @@ from mapfilter.positioning.bayes.beliefs.moving import moved
 from mapfilter.positioning.bayes.beliefs.smoothing import BayesSmoother
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
 from mapfilter.positioning.bayes.claims import judged
-from mapfilter.positioning.bayes.clock_check import with_clocks_checked
 from mapfilter.positioning.bayes.doubted import doubted
 from mapfilter.positioning.bayes.maker import Maker
 from mapfilter.positioning.bayes.outputs import step_output
@@ -184,8 +183,9 @@ class BayesPositioner(Filter[BayesState]):
         least = max(self.options.split_mass, _LEAST_AT_START)
         status = Status.TRACKING if near > least else Status.SEARCHING
         belief, known = replace(belief, status=status), status is Status.TRACKING
-        watch = SensorWatch(undirected=UndirectedWay(since_m=0.0))
-        return replace(self.begin(), belief=belief, status=status, proven=known, watch=watch)
+        begun = self.begin()
+        watch = begun.watch._replace(undirected=UndirectedWay(since_m=0.0))
+        return replace(begun, belief=belief, status=status, proven=known, watch=watch)
 
     def step(
         self, state: BayesState, epoch: Epoch, rng: np.random.Generator
@@ -238,9 +238,6 @@ class BayesPositioner(Filter[BayesState]):
                     state = replace(state, belief=belief, status=status)
                 positioned = gnss_of(state).was_used(epoch.time_s)
                 state = judged(self.beliefs, state, weighed=used, positioned=positioned)
-        if not self.grid:
-            state, apart = with_clocks_checked(self.beliefs, state, updates, epoch.time_s)
-            unused += apart
         unused += doubted(self.beliefs, state, hold, epoch, unused, moves=motion is Reason.USED)
         gnss = gnss_of(state)
         if gnss.was_used(epoch.time_s):

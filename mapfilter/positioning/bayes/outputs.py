@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from math import isfinite, nan
 
-import numpy as np
-
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import empty_summary
 from mapfilter.filters.particle import ParticleBelief
@@ -81,17 +79,12 @@ def _output(
             if count:
                 tail = sample_tail(*places, summary.mean, p_none=state.null.probability)
                 wide_m, protection_m = protected_m(tail, summary.radii_m)
-    radii_m, clocks = summary.radii_m, state.clocks
-    if clocks is not None and any(clocks.wider_m):
-        *wider_m, more_m = clocks.wider_m
-        radii_m = radii_m + np.array(wider_m)
-        wide_m, protection_m = wide_m + more_m, protection_m + more_m
     fix = Fix(
         time_s,
         float(summary.mean[0]) + west,
         float(summary.mean[1]) + south,
         summary.covariance_m2,
-        radii_m,
+        summary.radii_m,
         state.status,
         count,
         summary.mass_50m if count else nan,

@@ -16,7 +16,6 @@ from mapfilter.positioning.bayes.beliefs.legs import NO_LEG, Lead, Leg, moved_on
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning as DeadReckoning
 from mapfilter.positioning.bayes.beliefs.path import RecentPath
 from mapfilter.positioning.bayes.certainty import Recovery
-from mapfilter.positioning.bayes.clocks import Clocks
 from mapfilter.positioning.bayes.rivals.alternative import (
     AlternativeHypothesis,
     MapBelief,
@@ -99,8 +98,6 @@ class BayesState:
         Checksum of the area that it is of; empty where nobody states it.
     leg : Leg
         Steps by which its beliefs have not been moved yet.
-    clocks : Clocks or None
-        Whether reports and motion have one clock; None while no position is followed.
     """
 
     belief: MapBelief | None = None
@@ -129,7 +126,6 @@ class BayesState:
     alone_from_m: float = nan
     area: str = ""
     leg: Leg = NO_LEG
-    clocks: Clocks | None = None
 
     def __repr__(self) -> str:
         """Return status, hypotheses and way in one line."""
@@ -160,7 +156,6 @@ class BayesState:
             unaided=(),
             proven=False,
             leg=NO_LEG,
-            clocks=None,
         )
 
     @property

@@ -256,7 +256,6 @@ class Weighing:
             alone_from_m=state.alone_from_m,
             area=state.area,
             leg=state.leg,
-            clocks=state.clocks,
         )
 
     def _proven(self, state: BayesState, now: Resolution, before: MapBelief) -> bool:

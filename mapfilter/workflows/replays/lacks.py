@@ -158,7 +158,6 @@ def notes_after(
         *(() if path is None else truth_notes(estimate, path)),
         *fixes_note(opened, log, truth, uses, estimate),
         *_motion_note(opened, log, options, estimate),
-        *clocks_note(estimate),
         *pause_note(estimate),
         *early_end_note(opened, log, estimate, uses, over_map=database is not None),
         *coarse_pixels_note(options, estimate, database),
@@ -194,18 +193,6 @@ def fixes_note(
     text = f"gnss: {len(log.gnss) - unused} of {len(log.gnss)} positions of {names} used as GNSS "
     text += "fixes; --without gnss leaves them out"
     return (text if len(log.truth) else f"{text}, --truth {placed[0].path.name} scores by them",)
-
-
-def clocks_note(estimate: TrackEstimate) -> tuple[str, ...]:
-    """Return a note where reports fit positions of another time; none else."""
-    told = [one for one in estimate.unused if one.reason is Reason.CLOCKS_APART]
-    if not told:
-        return ()
-    last = told[-1]
-    later = "earlier" if last.what.startswith("-") else "later"
-    text = f"radio: by {last.time_s:.0f} s reports fit the positions of about {last.what[1:]} "
-    text += f"{later}; clocks of reports and motion may differ, and radii allow for it; "
-    return (f"{text}convert --offset FILE=S moves the times of a recording",)
 
 
 def pause_note(estimate: TrackEstimate) -> tuple[str, ...]:

@@ -37,7 +37,7 @@ _COLUMNS = ("role", "technology", *_FIELDS)
 _YEARLESS = re.compile(r"\d\d-\d\d \d\d:\d\d:\d\d")
 _STAMP = re.compile(
     r"(?:(\d{4}-\d\d-\d\d)[ T](\d\d:\d\d:\d\d(?:\.\d{1,9})?)(?:\s([+-]\d{4}))?"
-    r"|\s*(\d{9,10}\.\d{1,9}))\s"
+    r"|\s{0,20}(\d{9,10}\.\d{1,9}))\s"
 )
 """Times of logcat: with ``-v year``, also with zone, or ``-v epoch``."""
 _WITH_YEAR = (

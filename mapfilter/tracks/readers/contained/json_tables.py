@@ -20,12 +20,12 @@ from mapfilter.tracks.readers.contained.tables import (
 )
 from mapfilter.tracks.readers.texts.text import Text
 
-_BEGINS = re.compile(rb"\s*(?:\[\s*)?\{\s*(?:\"|\})")
+_BEGINS = re.compile(rb"(?:\[\s{0,99})?\{\s{0,99}(?:\"|\})")
 _LINE_BEGINS = re.compile(rb"[^{}\[\]\"\n]{1,80}\{\"")
 """A time and a topic before the object of a line, as OwnTracks' recorder writes them."""
 _LIST = re.compile(r"\"(\w{1,40})\"\s{0,20}:\s{0,20}\[\s{0,40}(?=\{)")
 _BLANK = re.compile(r"[\s,]*")
-_LARGEST_BYTES = 1 << 28
+_HEAD_BYTES, _LARGEST_BYTES = 1 << 12, 1 << 28
 _DEEPEST = 8
 _OF_KINDS: Mapping[str, tuple[str, ...]] = {"class": ("TPV",), "_type": ("location",)}
 """Names by which programs tell their kinds of records (gpsd, OwnTracks), and the kinds to read."""
@@ -39,7 +39,7 @@ _OF_DEGREES = re.compile(r"CRS84|EPSG:{1,2}4326|OGC:1\.3:CRS84", re.IGNORECASE)
 
 def is_json(data: bytes) -> bool:
     """Return whether a text begins as JSON whose records may be rows, or each line has one."""
-    return bool(_BEGINS.match(data) or _LINE_BEGINS.match(data))
+    return bool(_BEGINS.match(data[:_HEAD_BYTES].lstrip()) or _LINE_BEGINS.match(data))
 
 
 def json_table(text: Text) -> Text | None:

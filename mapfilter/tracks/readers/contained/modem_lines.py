@@ -14,7 +14,7 @@ from mapfilter.tracks.readers.texts.text import Text
 MARK = "+QENG:"
 _AT = re.compile(r"\bAT\+\w{2,12}|^\+\w{2,12}: ", re.MULTILINE)
 _TIME = re.compile(
-    r"[\[(]?\s*(\d{4}-\d\d-\d\d[ T_]\d\d:\d\d:\d\d(?:[.,]\d{1,9})?(?:Z|[+-]\d\d:?\d\d)?"
+    r"[\[(]?\s{0,20}(\d{4}-\d\d-\d\d[ T_]\d\d:\d\d:\d\d(?:[.,]\d{1,9})?(?:Z|[+-]\d\d:?\d\d)?"
     r"|\d{1,2}[./]\d{1,2}[./]\d{4},? \d\d:\d\d:\d\d(?:[.,]\d{1,9})?|\d{10}(?:\.\d{1,9})?|\d{13})\b"
 )
 _COLUMNS = ("time", "role", "technology", "mcc", "mnc", "lac", "ci", "bsic", "arfcn", "level_dbm")
