@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections import Counter, deque
 from collections.abc import Mapping
 from dataclasses import replace
+from json import JSONDecoder
 from typing import Any
 
+from mapfilter._inputs import json_within
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.tracks.readers.contained.tables import (
@@ -84,7 +85,7 @@ def json_table(text: Text) -> Text | None:
 def _records(content: str) -> tuple[list[Any], list[str]]:
     """Return the objects of a text, and notes on what was left out."""
     # A table has the digits of numbers as they are.
-    decoder = json.JSONDecoder(parse_float=str, parse_int=str)
+    decoder = json_within()
     begin = content.lstrip()
     if begin.startswith("["):
         items, at = _items(begin, 1, decoder)
@@ -103,7 +104,7 @@ def _records(content: str) -> tuple[list[Any], list[str]]:
     return objects, notes
 
 
-def _of_lines(content: str, decoder: json.JSONDecoder) -> tuple[list[Any], bool]:
+def _of_lines(content: str, decoder: JSONDecoder) -> tuple[list[Any], bool]:
     """Return the objects of lines that hold some, or end in some; other lines are damaged."""
     found: list[Any] = []
     whole = True
@@ -125,7 +126,7 @@ def _of_lines(content: str, decoder: json.JSONDecoder) -> tuple[list[Any], bool]
     return found, whole
 
 
-def _items(content: str, at: int, decoder: json.JSONDecoder) -> tuple[list[Any], int]:
+def _items(content: str, at: int, decoder: JSONDecoder) -> tuple[list[Any], int]:
     """Return values until the end of a list or of the text, or until damage, and where that is."""
     found: list[Any] = []
     while True:
