@@ -203,6 +203,20 @@ def test_layers_of_several_points(tmp_path):
         read_recording(layer(tmp_path, [MultiPoint([(4, 50), (4, 51)])] * 2))
 
 
+def test_rows_of_a_layer_without_a_point_or_a_value(tmp_path):
+    path = tmp_path / "own.gpkg"
+    columns = {
+        "time": pd.date_range("2026-05-01T10:00", periods=4, freq="s", tz="UTC"),
+        "rsrp": pd.array([-90, None, -91, -92], dtype="Int64"),
+        "moving": pd.array([True, None, False, True], dtype="boolean"),
+    }
+    places = [None, Point(), Point(4.3, 50.0), Point(4.3, 50.1)]
+    gpd.GeoDataFrame(columns, geometry=places, crs="EPSG:4326").to_file(path)
+    found = read_recording(path)
+    assert found.tables["positions"]["lat_deg"].tolist() == [50.0, 50.1]
+    assert found.tables["radio"]["level_dbm"].tolist() == [-90, -91, -92]
+
+
 def test_a_layer_of_no_place_on_earth_is_refused(tmp_path):
     crs = 'LOCAL_CS["Undefined Cartesian SRS",UNIT["metre",1]]'
     with pytest.raises(InputError, match=r"crs: expected .* found Undefined .*likely: set"):
