@@ -68,6 +68,26 @@ def test_a_second_list_is_noted(tmp_path):
     assert any("cells: 5 objects left out" in note for note in found.notes)
 
 
+def test_access_points_are_no_cells(tmp_path):
+    """Their levels were taken for those of cells, which were not used."""
+    cell = {"mobileCountryCode": 206, "mobileNetworkCode": 1, "cellId": 12, "signalStrength": -95}
+    items = [
+        {
+            "timestamp": 1000 * (START_S + at),
+            "position": {"latitude": 50 + at / 1000, "longitude": 4.3},
+            "cellTowers": [cell],
+            "wifiAccessPoints": [{"macAddress": "01:02:03:04:05:06", "signalStrength": -51}] * 2,
+        }
+        for at in range(5)
+    ]
+    found = read_recording(written(tmp_path, "own.json", json.dumps({"items": items})))
+    assert found.tables["radio"]["level_dbm"].tolist() == [-95] * 5
+    assert len(found.tables["positions"]) == 5
+    assert "wifiAccessPoints: 10 objects left out, no cells" in found.notes
+    both = json.dumps({"wifi": [{"rssi": -51}] * 99, "cells": ROWS})
+    assert len(positions_of(written(tmp_path, "both.json", both))) == 30
+
+
 def test_digits_of_json_stay(tmp_path):
     digits = '[{"time": 1777629330.25, "lat": 50.8, "lon": 4.3, "x": %s}]' % ("1" * 5000)
     assert positions_of(written(tmp_path, "own.json", digits))["time_s"].tolist() == [
