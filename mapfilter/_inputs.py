@@ -212,6 +212,20 @@ def json_value(data: bytes, constant: Callable[[str], Any] | None = None) -> Any
     return json.loads(text, object_pairs_hook=_without_repeats, parse_constant=constant)
 
 
+def json_within() -> json.JSONDecoder:
+    """Return what reads values of JSON within a text, one after the other; numbers as texts.
+
+    A file of records may be cut off, or hold several values. Keys that stand twice in one object
+    have the last value. Raises as :func:`json_value`.
+
+    Examples
+    --------
+    >>> json_within().raw_decode('{"a": 1.50} {"a"')
+    ({'a': '1.50'}, 11)
+    """
+    return json.JSONDecoder(parse_float=str, parse_int=str)
+
+
 def named_file(crs_text: str) -> str:
     """Return what a CRS names of the machine's files, or an empty text.
 

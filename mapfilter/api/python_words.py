@@ -69,6 +69,8 @@ def in_python(text: str) -> str:
     'set layout="atoll", or name it in columns={"east": …}'
     >>> in_python("set cells.eirp_dbm; else name what it holds in [cells.columns]")
     'set defaults={"eirp_dbm": …}; else name what it holds in columns'
+    >>> in_python("cells.new_plan.csv row 7")
+    'cells.new_plan.csv row 7'
     """
     text = _PLAN_LAYOUT.sub(r'layout="\1"', text).replace("[cells.columns]", "columns")
     text = _PLAN_COLUMN.sub(r'columns={"\1": …}', text)

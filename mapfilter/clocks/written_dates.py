@@ -31,8 +31,11 @@ _IN_PLACE = (
         r"^(\d\d?:\d\d(?::\d\d(?:\.\d{1,9})?)?)\s+(\d{1,4}[-/.]\d\d?[-/.]\d{1,4})$",
         r"\2 \1",
     ),
-    # A comma before the time of day, as a browser writes it, or a hyphen.
-    (r"^(\d{1,4}[/.-]\d\d?[/.-]\d{1,4})(?:,?\s+|-)(\d)", r"\1 \2"),
+    # A comma before the time of day, as a browser writes it, or a hyphen. A date of XML may end in
+    # an offset, such as 2026-05-01-02:00.
+    (r"^(\d{1,4}[/.-]\d\d?[/.-]\d{1,4}),?\s+(\d)", r"\1 \2"),
+    (r"^(\d\d?[/.-]\d\d?[/.-]\d{2,4})-(\d)", r"\1 \2"),
+    (r"^(\d{4}[/.-]\d\d?[/.-]\d\d?)-(\d\d?[:.]\d\d[:.]\d\d)", r"\1 \2"),
     # A time of day with dots.
     (r"^(\S+\s)(\d\d?)\.(\d\d)\.(\d\d)(\D|$)", r"\1\2:\3:\4\5"),
     # A comma for the point of a fraction, which is a blank in quotes.

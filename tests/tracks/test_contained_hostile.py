@@ -1,6 +1,7 @@
 """Tables in other forms that are damaged, odd, or far larger than their files."""
 
 import json
+import zipfile
 
 import geopandas as gpd
 import numpy as np
@@ -11,6 +12,8 @@ import pytest
 from shapely.geometry import MultiPoint, Point
 
 from mapfilter.errors import InputError
+from mapfilter.tracks.joining.recordings import read_recordings
+from mapfilter.tracks.open_options import OpenOptions
 from mapfilter.tracks.readers.formats import read_recording
 
 START_S = 1_777_629_330
@@ -63,6 +66,26 @@ def test_a_second_list_is_noted(tmp_path):
     content = json.dumps({"locations": ROWS, "cells": ROWS[:5]})
     found = read_recording(written(tmp_path, "own.json", content))
     assert any("cells: 5 objects left out" in note for note in found.notes)
+
+
+def test_access_points_are_no_cells(tmp_path):
+    """Their levels were taken for those of cells, which were not used."""
+    cell = {"mobileCountryCode": 206, "mobileNetworkCode": 1, "cellId": 12, "signalStrength": -95}
+    items = [
+        {
+            "timestamp": 1000 * (START_S + at),
+            "position": {"latitude": 50 + at / 1000, "longitude": 4.3},
+            "cellTowers": [cell],
+            "wifiAccessPoints": [{"macAddress": "01:02:03:04:05:06", "signalStrength": -51}] * 2,
+        }
+        for at in range(5)
+    ]
+    found = read_recording(written(tmp_path, "own.json", json.dumps({"items": items})))
+    assert found.tables["radio"]["level_dbm"].tolist() == [-95] * 5
+    assert len(found.tables["positions"]) == 5
+    assert "wifiAccessPoints: 10 objects left out, no cells" in found.notes
+    both = json.dumps({"wifi": [{"rssi": -51}] * 99, "cells": ROWS})
+    assert len(positions_of(written(tmp_path, "both.json", both))) == 30
 
 
 def test_digits_of_json_stay(tmp_path):
@@ -200,6 +223,20 @@ def test_layers_of_several_points(tmp_path):
         read_recording(layer(tmp_path, [MultiPoint([(4, 50), (4, 51)])] * 2))
 
 
+def test_rows_of_a_layer_without_a_point_or_a_value(tmp_path):
+    path = tmp_path / "own.gpkg"
+    columns = {
+        "time": pd.date_range("2026-05-01T10:00", periods=4, freq="s", tz="UTC"),
+        "rsrp": pd.array([-90, None, -91, -92], dtype="Int64"),
+        "moving": pd.array([True, None, False, True], dtype="boolean"),
+    }
+    places = [None, Point(), Point(4.3, 50.0), Point(4.3, 50.1)]
+    gpd.GeoDataFrame(columns, geometry=places, crs="EPSG:4326").to_file(path)
+    found = read_recording(path)
+    assert found.tables["positions"]["lat_deg"].tolist() == [50.0, 50.1]
+    assert found.tables["radio"]["level_dbm"].tolist() == [-90, -91, -92]
+
+
 def test_a_layer_of_no_place_on_earth_is_refused(tmp_path):
     crs = 'LOCAL_CS["Undefined Cartesian SRS",UNIT["metre",1]]'
     with pytest.raises(InputError, match=r"crs: expected .* found Undefined .*likely: set"):
@@ -210,3 +247,39 @@ def test_times_of_day_with_dots_are_no_dates(tmp_path):
     rows = "".join(f"10.05.{at},50.8,4.3{at},-90\n" for at in range(16, 30))
     with pytest.raises(InputError, match=r"row 2, time: expected .*'10\.05\.16'"):
         read_recording(written(tmp_path, "own.csv", f"time,lat,lon,rsrp\n{rows}"))
+
+
+def test_what_the_only_file_of_a_zip_lacks_is_told(tmp_path):
+    path = tmp_path / "own.kmz"
+    line = "<LineString><coordinates>4,50 5,51</coordinates></LineString>"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("doc.kml", f"<kml><Placemark>{line}</Placemark></kml>")
+    with pytest.raises(InputError, match="likely: a line without times"):
+        read_recordings([path], OpenOptions())
+
+
+def test_a_workbook_of_opendocument_is_no_zip_of_recordings(tmp_path):
+    path = tmp_path / "own.ods"
+    names = ("office", "table", "text")
+    urn = "urn:oasis:names:tc:opendocument:xmlns"
+    spaces = " ".join(f'xmlns:{name}="{urn}:{name}:1.0"' for name in names)
+    cell = '<table:table-cell office:value-type="string"><text:p>{}</text:p></table:table-cell>'
+    rows = [["time", "lat", "lon"], *([START_S + at, 50 + at / 1000, 4.3] for at in range(5))]
+    lines = ("".join(map(cell.format, row)) for row in rows)
+    table = "".join(f"<table:table-row>{line}</table:table-row>" for line in lines)
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("mimetype", "application/vnd.oasis.opendocument.spreadsheet")
+        archive.writestr(
+            "content.xml",
+            f"<office:document-content {spaces}><office:body><office:spreadsheet>"
+            f'<table:table table:name="S">{table}</table:table>'
+            "</office:spreadsheet></office:body></office:document-content>",
+        )
+        archive.writestr(
+            "META-INF/manifest.xml",
+            f'<manifest:manifest xmlns:manifest="{urn}:manifest:1.0">'
+            '<manifest:file-entry manifest:full-path="/" manifest:media-type=""/>'
+            "</manifest:manifest>",
+        )
+    found, _ = read_recordings([path], OpenOptions())
+    assert len(found[0].tables["positions"]) == 5

@@ -294,3 +294,10 @@ def test_days_of_a_year_and_seconds_of_the_day(tmp_path):
     assert any("if it is GPS time, 18 s ahead of it" in note for note in log.notes)
     log = read(tmp_path, "year,doy,hour,min,sec", ["2026,133,10,0,58", "2026,134,0,0,0"])
     assert log.start_utc_s == START_S
+
+
+@pytest.mark.parametrize("text", ["2026-05-01-02:00", "2026-05-01-05"])
+def test_a_date_of_xml_with_its_offset_is_no_time(tmp_path, text):
+    """The offset was taken for a time of day."""
+    with pytest.raises(InputError, match="row 2, time: expected"):
+        read(tmp_path, "time", [text])

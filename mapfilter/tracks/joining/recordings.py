@@ -12,6 +12,7 @@ from mapfilter.errors import ConfigError, Faults, InputError, MapfilterError, fa
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.log_folders import files_in, is_log
 from mapfilter.tracks.open_options import CombineOptions, OpenOptions
+from mapfilter.tracks.readers.contained.opening import OF_TABLES
 from mapfilter.tracks.readers.format import ReadOptions
 from mapfilter.tracks.readers.formats import format_of, read_recording
 from mapfilter.tracks.readers.recorded.recording import Recording
@@ -128,6 +129,9 @@ def _expanded(paths: Sequence[Path]) -> tuple[list[Path], tuple[str, ...]]:
         if not is_folder:
             for other in (p for p in inner if p not in known):
                 check_zipped(other, path)
+        if not (known or is_folder) and len(inner) == 1 and inner[0].suffix.lower() in OF_TABLES:
+            # What it lacks is told when it is read.
+            known = inner
         if not known:
             expected = f"recordings in the {'folder' if is_folder else 'ZIP'}"
             logs = [p.name for p in sorted(path.iterdir()) if is_log(p)] if is_folder else []

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections import Counter, deque
 from collections.abc import Mapping
 from dataclasses import replace
+from json import JSONDecoder
 from typing import Any
 
+from mapfilter._inputs import json_within
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.tracks.readers.contained.tables import (
@@ -32,6 +33,8 @@ _OF_KINDS: Mapping[str, tuple[str, ...]] = {"class": ("TPV",), "_type": ("locati
 _CRS = re.compile(
     r"\"crs\"\s{0,9}:\s{0,9}\{[^{}]{0,99}\{[^{}]{0,99}?\"name\"\s{0,9}:\s{0,9}\"([^\"]{0,99})"
 )
+_OF_NO_CELLS = re.compile("wi-?fi|wlan|bluetooth|beacon", re.IGNORECASE)
+"""Lists whose levels, and positions once more, would be taken for those of cells."""
 _OF_ESTIMATES = {"filter", "status", "radius_95_m"}
 _DAMAGED = "the file is cut off or damaged; whole records were read"
 _OF_DEGREES = re.compile(r"CRS84|EPSG:{1,2}4326|OGC:1\.3:CRS84", re.IGNORECASE)
@@ -62,11 +65,11 @@ def json_table(text: Text) -> Text | None:
     _check_crs(text)
     records, left = _of_kind(records)
     rows: list[dict[Path_, str]] = []
-    most, paths = MOST_VALUES, dict[Path_, Path_]()
+    most, paths, aside = MOST_VALUES, dict[Path_, Path_](), Counter[str]()
     records.reverse()
     while records:
         # Records and rows of a large file need not be in memory at the same time.
-        made = _rows(_with_place(records.pop()), text, most)
+        made = _rows(_with_place(records.pop()), text, most, aside)
         most -= sum(map(len, made))
         rows += ({paths.setdefault(at, at): value for at, value in row.items()} for row in made)
     # An object of thousands of names holds objects by their ids, or is of settings.
@@ -75,6 +78,7 @@ def json_table(text: Text) -> Text | None:
     if {path[-1] for row in rows for path in row} >= _OF_ESTIMATES:
         hint = "what a filter estimated; it is no recording, nor a ground truth"
         raise fail(InputError, str(text.path), "a recording", "an estimate of mapfilter", hint)
+    notes += [f"{name}: {number_of(n, 'object')} left out, no cells" for name, n in aside.items()]
     notes += [
         f"{number_of(n, f'record of {kind}', f'records of {kind}')} left out" for kind, n in left
     ]
@@ -84,7 +88,7 @@ def json_table(text: Text) -> Text | None:
 def _records(content: str) -> tuple[list[Any], list[str]]:
     """Return the objects of a text, and notes on what was left out."""
     # A table has the digits of numbers as they are.
-    decoder = json.JSONDecoder(parse_float=str, parse_int=str)
+    decoder = json_within()
     begin = content.lstrip()
     if begin.startswith("["):
         items, at = _items(begin, 1, decoder)
@@ -103,7 +107,7 @@ def _records(content: str) -> tuple[list[Any], list[str]]:
     return objects, notes
 
 
-def _of_lines(content: str, decoder: json.JSONDecoder) -> tuple[list[Any], bool]:
+def _of_lines(content: str, decoder: JSONDecoder) -> tuple[list[Any], bool]:
     """Return the objects of lines that hold some, or end in some; other lines are damaged."""
     found: list[Any] = []
     whole = True
@@ -125,7 +129,7 @@ def _of_lines(content: str, decoder: json.JSONDecoder) -> tuple[list[Any], bool]
     return found, whole
 
 
-def _items(content: str, at: int, decoder: json.JSONDecoder) -> tuple[list[Any], int]:
+def _items(content: str, at: int, decoder: JSONDecoder) -> tuple[list[Any], int]:
     """Return values until the end of a list or of the text, or until damage, and where that is."""
     found: list[Any] = []
     while True:
@@ -145,17 +149,21 @@ def _after_blanks(content: str, at: int) -> int:
 
 
 def _list_in(record: Mapping[str, Any]) -> tuple[list[Any], list[str]]:
-    """Return the longest list of objects in an object, and notes on others; else none."""
+    """Return the longest list of objects in an object, of cells if any, and notes on others."""
     lists = {
         name: value
         for name, value in record.items()
         if isinstance(value, list) and value and isinstance(value[0], dict)
     }
-    longest = max(lists, key=lambda name: len(lists[name]), default="")
+    longest = max(lists, key=lambda name: (not _is_of_no_cells(name), len(lists[name])), default="")
     return lists.pop(longest, []), [
-        f"{name[:40]}: {number_of(len(value), 'object')} left out; {longest[:40]} is longer"
+        f"{name[:40]}: {number_of(len(value), 'object')} left out; {longest[:40]} is read"
         for name, value in lists.items()
     ]
+
+
+def _is_of_no_cells(name: str) -> bool:
+    return _OF_NO_CELLS.search(name[:40]) is not None
 
 
 def _check_crs(text: Text) -> None:
@@ -195,11 +203,12 @@ def _with_place(record: dict[str, Any]) -> dict[str, Any]:
 
 
 def _rows(
-    record: Mapping[str, Any], text: Text, most: int, above: int = 0
+    record: Mapping[str, Any], text: Text, most: int, aside: Counter[str], above: int = 0
 ) -> list[dict[Path_, str]]:
     """Return a record's values by their paths, once for each object of a list within it.
 
-    ``most`` values may be in them, and ``above`` names led to the record.
+    ``most`` values may be in them, ``above`` names led to the record, and ``aside`` counts objects
+    of lists that are of no cells.
     """
     own: dict[Path_, str] = {}
     lists: list[tuple[Path_, list[Any]]] = []
@@ -213,13 +222,18 @@ def _rows(
         if isinstance(value, dict):
             todo += [((*path, str(name)), inner) for name, inner in value.items()]
         elif isinstance(value, list):
-            lists += [(path, value)] if value and isinstance(value[0], dict) else []
+            if value and _is_of_no_cells(path[-1]):
+                aside[path[-1][:40]] += len(value)
+            elif value and isinstance(value[0], dict):
+                lists.append((path, value))
         else:
             own[path] = written(value)
     rows: list[dict[Path_, str]] = []
     for path, items in lists:
         for item in items:
-            inner = _rows(item, text, most, above + len(path)) if isinstance(item, dict) else []
+            inner = (
+                _rows(item, text, most, aside, above + len(path)) if isinstance(item, dict) else []
+            )
             rows += [{**own, **{(*path, *at): v for at, v in row.items()}} for row in inner]
             most -= sum(map(len, rows[len(rows) - len(inner) :]))
             if most < 0:

@@ -94,6 +94,7 @@ def _degrees_of(path: Path, frame: Any) -> tuple[Floats, Floats]:
         hint = "make single points of it (Multipart to Singleparts in QGIS)"
         raise fail(InputError, str(path), "one point in each row", "several in some", hint)
     point = shapely.get_geometry(geometry, 0)
+    point[shapely.is_empty(point)] = None
     return shapely.get_x(point), shapely.get_y(point)
 
 

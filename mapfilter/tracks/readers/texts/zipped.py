@@ -17,7 +17,8 @@ from mapfilter._words import number_of
 from mapfilter.errors import InputError, MapfilterError, fail
 
 _BEGIN = b"PK\x03\x04"
-_WORKBOOK = "[Content_Types].xml"
+_WORKBOOKS = frozenset(("[Content_Types].xml",)), frozenset(("mimetype", "content.xml"))
+"""Files of workbooks of Excel and of OpenDocument."""
 _MOST_FILES = 1000
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _CHECKED_BYTES = 1 << 18
@@ -25,13 +26,14 @@ _DAMAGE = (OSError, EOFError, NotImplementedError, ValueError, zipfile.BadZipFil
 
 
 def is_zip(path: Path) -> bool:
-    """Return whether a path is a ZIP, and no workbook of Excel, which is a ZIP, too."""
+    """Return whether a path is a ZIP, and no workbook, which is a ZIP, too."""
     try:
         with open_input(path) as stream:
             if stream.read(len(_BEGIN)) != _BEGIN:
                 return False
         with _archive(path) as archive:
-            return _WORKBOOK not in archive.namelist()
+            names = frozenset(archive.namelist())
+            return not any(files <= names for files in _WORKBOOKS)
     except OSError:
         return False
     except MapfilterError:
