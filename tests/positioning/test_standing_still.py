@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from cross_world import make_database, walk_log
 
-from mapfilter.positioning.bayes import state as bayes_state
+from mapfilter.positioning.bayes import outputs
 from mapfilter.positioning.bayes.area.opened_area import open_area
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.loop import locate
@@ -42,9 +42,9 @@ def log():
 
 def test_a_belief_that_stays_is_summarised_once(positioner, log, monkeypatch):
     counts = []
-    tail = bayes_state.sample_tail
+    tail = outputs.sample_tail
     monkeypatch.setattr(
-        bayes_state, "sample_tail", lambda *args, **more: counts.append(1) or tail(*args, **more)
+        outputs, "sample_tail", lambda *args, **more: counts.append(1) or tail(*args, **more)
     )
     estimate = locate(log, positioner, np.random.default_rng(3)).estimate
     assert len(estimate) > STOOD

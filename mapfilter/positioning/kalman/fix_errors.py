@@ -78,9 +78,13 @@ class FixErrors(NamedTuple):
         east_m, north_m = self.way.east_m + east_m, self.way.north_m + north_m
         return self._replace(way=Way(east_m, north_m, self.way.gaps + gaps))
 
-    def coasted(self, motion: Motion, about: Floats) -> FixErrors:
-        """Return them after motion of dead reckoning, linear about a mean."""
-        coasting = self.coasting.moved(motion, about)
+    def coasted(self, motion: Motion, about: Floats, gaps: int) -> FixErrors:
+        """Return them after motion of dead reckoning, linear about a mean.
+
+        Steps without direction or length, of which there are ``gaps``, lead to no place that fixes
+        could contradict.
+        """
+        coasting = self.coasting.begun_anew() if gaps else self.coasting.moved(motion, about)
         return self if coasting is self.coasting else self._replace(coasting=coasting)
 
     def at_time(self, time_s: float) -> FixErrors:

@@ -157,7 +157,7 @@ class KalmanStep:
             after = motion[0] @ mean + motion[2]
             gone = complex(*(after - mean)[self.where]) * exp(-1j * after[TURNED])
             self.fixes = self.fixes.moved(gone.real, gone.imag, gaps)
-        self.fixes = self.fixes.coasted(motion, moments.mean[: self.own.size])
+        self.fixes = self.fixes.coasted(motion, moments.mean[: self.own.size], gaps)
         return motion, moved_m
 
     def _speed_mps(self) -> float:
