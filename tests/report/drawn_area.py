@@ -12,7 +12,7 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.lattice import Lattice
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.step_output import Fix
-from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.report.basemap import BaseMap
 
 CRS = "EPSG:32635"
@@ -60,3 +60,22 @@ def pixels_near(path: Path, colour: str) -> int:
     """Count the pixels of a colour, to within the rounding of its channels."""
     image = imread(path)[:, :, :3]
     return int((np.abs(image - to_rgb(colour)).max(axis=2) < 0.02).sum())
+
+
+def drawn_area() -> Area:
+    """A street with a walk along it, cells of a site, one indoors and one far away."""
+    lattice = Lattice(CRS, WEST_M, NORTH_M, 5.0, 80, 100)
+    west, south, east, _ = lattice.bounds_m
+    street = np.array([[west, south + 100.0], [east, south + 100.0]])
+    base = BaseMap(lattice.bounds_m, (street,), attribution="© OpenStreetMap contributors")
+    common = {"north_m": south + 200.0, "height_m": 30.0, "eirp_dbm": 55.0, "frequency_mhz": 1800.0}
+    cells = (
+        Cell(id="S1A", site="S1", east_m=west + 250.0, azimuth_deg=90.0, **common),
+        Cell(id="S1$B$", site="S1", east_m=west + 250.0, azimuth_deg=270.0, **common),
+        Cell(id="I1", site="I1", east_m=west + 50.0, azimuth_deg=None, antenna="omni", indoor=True,
+             **common),
+        Cell(id="far", site="far", east_m=west - 9000.0, azimuth_deg=0.0, **common),
+    )  # fmt: skip
+    time_s = np.arange(0.0, 301.0)
+    truth = Truth(time_s, west + 20.0 + 1.4 * time_s, np.full(301, south + 100.0))
+    return Area(lattice, base, CellPlan(CRS, cells), truth)

@@ -6,7 +6,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
-from drawn_area import CRS, NORTH_M, WEST_M, Area, estimate, pixels_near, png_size
+from drawn_area import CRS, NORTH_M, WEST_M, Area, drawn_area, estimate, pixels_near, png_size
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
@@ -14,9 +14,8 @@ from mapfilter.errors import InputError, OutputError
 from mapfilter.evaluation.truth import Truth
 from mapfilter.filters.contract import Status
 from mapfilter.geodesy import grid_convergence_rad, unproject
-from mapfilter.lattice import Lattice
 from mapfilter.positioning.positioned_track import Snapshot
-from mapfilter.radio.cells import Cell, CellPlan
+from mapfilter.radio.cells import CellPlan
 from mapfilter.report.basemap import BaseMap, draw_base, local_frame
 from mapfilter.report.canvas import BLUE, DPI, ORANGE
 from mapfilter.report.coverage import plot_level
@@ -29,21 +28,7 @@ from mapfilter.report.track import plot_track
 
 @pytest.fixture(scope="session")
 def area() -> Area:
-    lattice = Lattice(CRS, WEST_M, NORTH_M, 5.0, 80, 100)
-    west, south, east, _ = lattice.bounds_m
-    street = np.array([[west, south + 100.0], [east, south + 100.0]])
-    base = BaseMap(lattice.bounds_m, (street,), attribution="© OpenStreetMap contributors")
-    common = {"north_m": south + 200.0, "height_m": 30.0, "eirp_dbm": 55.0, "frequency_mhz": 1800.0}
-    cells = (
-        Cell(id="S1A", site="S1", east_m=west + 250.0, azimuth_deg=90.0, **common),
-        Cell(id="S1$B$", site="S1", east_m=west + 250.0, azimuth_deg=270.0, **common),
-        Cell(id="I1", site="I1", east_m=west + 50.0, azimuth_deg=None, antenna="omni", indoor=True,
-             **common),
-        Cell(id="far", site="far", east_m=west - 9000.0, azimuth_deg=0.0, **common),
-    )  # fmt: skip
-    time_s = np.arange(0.0, 301.0)
-    truth = Truth(time_s, west + 20.0 + 1.4 * time_s, np.full(301, south + 100.0))
-    return Area(lattice, base, CellPlan(CRS, cells), truth)
+    return drawn_area()
 
 
 def snapshot(area: Area, count: int, travelled_m: float = 0.0, located: bool = False) -> Snapshot:
