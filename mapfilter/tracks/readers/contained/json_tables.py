@@ -15,7 +15,7 @@ from mapfilter.errors import InputError, fail
 from mapfilter.tracks.readers.contained.tables import (
     MOST_COLUMNS,
     MOST_VALUES,
-    Path_,
+    KeyPath,
     table_of_records,
     written,
 )
@@ -64,8 +64,8 @@ def json_table(text: Text) -> Text | None:
         return None
     _check_crs(text)
     records, left = _of_kind(records)
-    rows: list[dict[Path_, str]] = []
-    most, paths, aside = MOST_VALUES, dict[Path_, Path_](), Counter[str]()
+    rows: list[dict[KeyPath, str]] = []
+    most, paths, aside = MOST_VALUES, dict[KeyPath, KeyPath](), Counter[str]()
     records.reverse()
     while records:
         # Records and rows of a large file need not be in memory at the same time.
@@ -204,15 +204,15 @@ def _with_place(record: dict[str, Any]) -> dict[str, Any]:
 
 def _rows(
     record: Mapping[str, Any], text: Text, most: int, aside: Counter[str], above: int = 0
-) -> list[dict[Path_, str]]:
+) -> list[dict[KeyPath, str]]:
     """Return a record's values by their paths, once for each object of a list within it.
 
     ``most`` values may be in them, ``above`` names led to the record, and ``aside`` counts objects
     of lists that are of no cells.
     """
-    own: dict[Path_, str] = {}
-    lists: list[tuple[Path_, list[Any]]] = []
-    todo = deque[tuple[Path_, Any]](((str(name),), value) for name, value in record.items())
+    own: dict[KeyPath, str] = {}
+    lists: list[tuple[KeyPath, list[Any]]] = []
+    todo = deque[tuple[KeyPath, Any]](((str(name),), value) for name, value in record.items())
     while todo:
         path, value = todo.popleft()
         if above + len(path) > _DEEPEST:
@@ -228,7 +228,7 @@ def _rows(
                 lists.append((path, value))
         else:
             own[path] = written(value)
-    rows: list[dict[Path_, str]] = []
+    rows: list[dict[KeyPath, str]] = []
     for path, items in lists:
         for item in items:
             inner = (

@@ -13,7 +13,7 @@ from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.tracks.readers.texts.text import Text
 
-Path_ = tuple[str, ...]
+KeyPath = tuple[str, ...]
 """Names from the outermost object to a value."""
 MOST_VALUES = 50_000_000
 """Of a table, blank ones included."""
@@ -59,7 +59,7 @@ def as_table(text: Text, header: Sequence[str], rows: Iterable[Sequence[str]], w
     return replace(text, data=held.getvalue(), notes=notes, line=1, made_of=what)
 
 
-def names_of(paths: Sequence[Path_]) -> dict[Path_, str]:
+def names_of(paths: Sequence[KeyPath]) -> dict[KeyPath, str]:
     """Return names of columns: the last names of paths, all names where several end alike.
 
     Examples
@@ -71,7 +71,7 @@ def names_of(paths: Sequence[Path_]) -> dict[Path_, str]:
     return {path: path[-1] if count[path[-1].lower()] == 1 else ".".join(path) for path in paths}
 
 
-def table_of_records(text: Text, records: Sequence[Mapping[Path_, str]], what: str) -> Text:
+def table_of_records(text: Text, records: Sequence[Mapping[KeyPath, str]], what: str) -> Text:
     """Return records of values by their paths as a text of CSV; see :func:`as_table`."""
     paths = list(dict.fromkeys(path for record in records for path in record))
     if len(paths) > MOST_COLUMNS:

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
-from mapfilter.tracks.readers.contained.tables import Path_, table_of_records
+from mapfilter.tracks.readers.contained.tables import KeyPath, table_of_records
 from mapfilter.tracks.readers.texts.text import Text
 
 _PREFIX = re.compile(r"<(/?)[A-Za-z][A-Za-z0-9]{0,9}:")
@@ -50,7 +50,7 @@ def kml_table(text: Text) -> Text:
         It has no points with times, or entities, which could blow it up.
     """
     content = _content(text, "KML")
-    records: list[dict[Path_, str]] = []
+    records: list[dict[KeyPath, str]] = []
     uneven = 0
     for track in _elements(content, "Track"):
         track = _EMPTY.sub(r"<\1></\1>", track)
@@ -94,9 +94,9 @@ def tcx_table(text: Text) -> Text:
         It has none, or entities.
     """
     content = _content(text, "TCX")
-    records: list[dict[Path_, str]] = []
+    records: list[dict[KeyPath, str]] = []
     for point in _elements(content, "Trackpoint"):
-        found: dict[Path_, str] = {
+        found: dict[KeyPath, str] = {
             (name,): inner for tag, name in _TCX.items() for inner in _elements(point, tag)
         }
         if ("latitude",) in found and ("longitude",) in found:
@@ -120,12 +120,12 @@ def gpx_table(text: Text) -> Text | None:
     None where no point has a place and a time.
     """
     content = _content(text, "GPX")
-    records: list[dict[Path_, str]] = []
+    records: list[dict[KeyPath, str]] = []
     for tag in ("trkpt", "wpt"):
         for piece in content.split(f"<{tag} ")[1:]:
             attributes, _, rest = piece.partition(">")
             inner, closed, _ = rest.partition(f"</{tag}>")
-            found: dict[Path_, str] = {(name,): value for name, value in _LEAF.findall(inner)}
+            found: dict[KeyPath, str] = {(name,): value for name, value in _LEAF.findall(inner)}
             place = dict(_ATTRIBUTE.findall(attributes))
             if closed and place.keys() >= {"lat", "lon"} and ("time",) in found:
                 records.append({("lat",): place["lat"], ("lon",): place["lon"], **found})
@@ -163,5 +163,5 @@ def _elements(content: str, name: str) -> Iterator[str]:
             yield inner
 
 
-def _placed(parts: list[str]) -> dict[Path_, str]:
+def _placed(parts: list[str]) -> dict[KeyPath, str]:
     return dict(zip(_PLACE, parts, strict=False))
