@@ -255,3 +255,19 @@ def test_when_errors_are_compared(after_s, age_s, is_compared):
 @pytest.mark.parametrize(("means", "times"), [((1.5, 9.0), 1.5), ((9.0, 1.4), 1.0)])
 def test_times_that_are_hardly_more_are_none(means, times):
     assert Understated(means=means).times == times
+
+
+@pytest.mark.parametrize(("sd_rad", "is_compared"), [(0.14, True), (0.16, False)])
+@pytest.mark.parametrize("kind", ["usual", "held", "of before a gap"])
+def test_a_bent_belief_is_compared_only_where_it_is_held_or_of_before_a_gap(
+    sd_rad, is_compared, kind
+):
+    one = coast(10.0)
+    one.covariance[2, 2] = sd_rad**2
+    before = Coasting(kept=(one,), usual_s=1.0)
+    if kind == "held":
+        before = replace(before, apart=Separation(0.5, one), is_held=True)
+    if kind == "of before a gap":
+        before = replace(before, returned_s=10.0)
+    found = compared(before, 100.0, [400.0, 0.0])
+    assert (found.apart.coast is one) is (is_compared or kind != "usual")

@@ -185,3 +185,41 @@ def test_an_epoch_is_one(given):
 def test_a_place_is_three_numbers(place):
     fault = fault_of(changed("pseudoranges", place_m=place))
     assert fault.where.startswith("epoch, pseudoranges[0].place_m")
+
+
+ARRAY = np.array([2.0])
+
+
+@pytest.mark.parametrize(
+    ("part", "name", "value"),
+    [
+        ("motion", "step_m", ARRAY),
+        ("gnss", "east_m", ARRAY),
+        ("tdoa", "difference_m", ARRAY),
+        ("radio", "timing_advance", ARRAY),
+        ("radio", "arfcn", ARRAY),
+        ("pseudoranges", "place_m", (0.0, ARRAY, 0.0)),
+    ],
+)
+def test_an_array_of_one_number_is_no_number(part, name, value):
+    """It compares as one does."""
+    assert fault_of(changed(part, **{name: value})).where.startswith(where(part, name))
+
+
+@pytest.mark.parametrize("name", ["east_m", "north_m"])
+@pytest.mark.parametrize("value", [ARRAY, [5.0], {}, object(), 1j])
+def test_a_position_of_no_number_is_refused(name, value):
+    """Any number may be one, infinity, too."""
+    fault = fault_of(changed("gnss", **{name: value}))
+    assert fault.where == f"epoch, gnss.{name}"
+    assert fault.expected == f"metres {name.removesuffix('_m')}"
+
+
+@pytest.mark.parametrize("given", ["step", b"step", iter([STEP]), {STEP.step_m}, None, 3])
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("motion", "MotionStep"), ("radio", "ReportRow"), ("tdoa", "Difference")],
+)
+def test_rows_are_a_sequence(name, kind, given):
+    fault = fault_of(replace(FULL, **{name: given}))
+    assert (fault.where, fault.expected) == (f"epoch, {name}", f"a tuple of {kind}")

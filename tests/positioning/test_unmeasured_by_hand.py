@@ -59,6 +59,13 @@ def test_ways_before_and_after_a_fix_go_much_the_same_way(since_m, before_m):
     assert common_way_m2(before_m, since_m) == pytest.approx(both / 2, rel=1e-3)
 
 
+def test_a_short_step_without_a_heading_adds_as_little():
+    assert headless_step(0.05, 20.0).spread_m == pytest.approx(
+        sqrt(way_spread_m2(20.05) - way_spread_m2(20.0))
+    )
+    assert headless_step(0.05, 0.0).spread_m == pytest.approx(0.05, rel=1e-3)
+
+
 def test_the_step_of_a_rest_in_doubt_counts_by_its_probability():
     asked = []
     rest = SimpleNamespace(
