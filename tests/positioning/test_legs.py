@@ -114,7 +114,7 @@ def test_a_leg_is_whole_once_another_such_step_would_be_too_much(steps, whole):
 
 
 def test_where_none_waits_nothing_has_been_gone():
-    assert NO_LEG == (0, 0.0, 0.0, 0.0, 0.0, 0.0, DeadReckoning(), None)
+    assert (0, 0.0, 0.0, 0.0, 0.0, 0.0, DeadReckoning(), None) == NO_LEG
     assert leg_of(MotionStep(0.0, 1.0)) is NO_LEG
 
 
