@@ -1,6 +1,6 @@
 """Positions and ranges beside steps without a direction, by hand."""
 
-from math import nan
+from math import isnan, nan
 
 import pytest
 
@@ -100,3 +100,46 @@ def test_the_way_between_positions_is_two_and_a_half_of_their_deviations(varianc
     for off_m, is_left in ((-0.1, True), (0.0, False)):
         given = FAR._replace(since_m=apart_m - 3.0 + off_m)
         assert bool(of_way(given, by_ways=False, gnss=fix)[3]) is is_left
+
+
+def test_before_any_row_nothing_is_known():
+    way = UndirectedWay()
+    assert way[:2] == (False, False)
+    assert isnan(way.since_m)
+    assert isnan(way.heading_rad)
+    assert (way.seen_m, way.gone_m, way.is_unmeasured, way.waiting_m) == (0.0, 0.0, False, 0.0)
+    assert not way.is_blind
+
+
+def test_a_row_with_a_direction_ends_the_way_without_one():
+    given = FAR._replace(waiting_m=2.0, seen_m=4.0, is_unmeasured=True)
+    after, left, unused = given.spread(Epoch(9.0, (MotionStep(3.0, 0.4),)))
+    assert after == UndirectedWay(rows=True, directed=True, since_m=0.0, heading_rad=0.4)
+    assert unused == []
+    # What waits is part of it.
+    assert [(one.step_m, one.heading_rad) for one in left.motion] == [(5.0, 0.4)]
+
+
+@pytest.mark.parametrize(
+    ("given", "step", "waits"),
+    [
+        (FAR, STEP, True),
+        # Who had a direction goes on in it for ten metres.
+        (FAR._replace(directed=True, gone_m=0.0), STEP, False),
+        # A first turn is none, and a row that is spread already is no leg.
+        (UndirectedWay(since_m=500.0), MotionStep(3.0, nan, 0.2), False),
+        (FAR, MotionStep(3.0, nan, spread_m=2.0), False),
+    ],
+)
+def test_what_makes_a_leg_along_the_ways(given, step, waits):
+    after, left, _ = given.spread(Epoch(9.0, (step,)), by_ways=True)
+    assert after.waiting_m == (3.0 if waits else 0.0)
+    assert left.motion[0].step_m == (0.0 if waits else 3.0)
+
+
+@pytest.mark.parametrize(("since_m", "is_left"), [(0.7, True), (0.75, False)])
+def test_precise_positions_may_be_near_each_other(since_m, is_left):
+    fix = GnssFix(0.0, 0.0, 0.16, 0.34)
+    given = FAR._replace(since_m=since_m, seen_m=0.0)
+    _, _, unused = given.spread(Epoch(9.0, (MotionStep(0.5, nan),), gnss=fix))
+    assert bool(unused) is is_left
