@@ -226,8 +226,12 @@ def _check_number(where: str, value: Any, column: Column, faults: Faults) -> Non
         return
     try:
         number = float(value)
-    except (TypeError, ValueError, OverflowError):
+    except OverflowError:
         number = inf
+    except (TypeError, ValueError):
+        # Any number may be a position, and this is none.
+        faults.add(where, column.expected, shown(value), column.likely(inf))
+        return
     is_missing = isnan(number) and column.name not in _ALWAYS
     if not (is_missing or column.low <= number <= column.high):
         faults.add(where, column.expected, shown(value), column.likely(number))

@@ -1,6 +1,7 @@
 """Tasks of a build: which tiles have any, how many tasks there are, and what is read again."""
 
 from concurrent.futures import Executor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -122,3 +123,19 @@ def test_a_tile_that_vanishes_while_the_build_goes_on_is_made_again(world, tmp_p
     monkeypatch.setattr(FinishedParts, "load", gone)
     assert contents(again(world, tmp_path / "db", resume=True).path) == expected
     assert asked.count(1) == 2
+
+
+def test_points_beyond_the_rasters_are_counted(world, tmp_path):
+    """Two of five lie on them, the others to the north, west and south-east."""
+    lattice = Lattice(CRS, WEST - 50, NORTH + 50, 5.0, 60, 70)
+    row, col = np.array([9, 20, 21, 22, 50], np.int32), np.array([30, 9, 30, 30, 60], np.int32)
+    way = np.full(5, 7), np.zeros(5, np.int16), ("path",)
+    routes = RouteLattice(lattice, row, col, *way, np.ones(5, np.float32), np.zeros(5, bool))
+    built = build(world.rasters, world.plan, routes, tmp_path / "db", floor_dbm=-150.0)
+    counts = built.manifest["counts"]
+    assert (counts["points"], counts["points_off_rasters"]) == (2, 3)
+    assert built.points().row.tolist() == [11, 12]
+    assert job_of(world, routes).off_rasters(2) == 3
+    # Of points that are laid tile by tile nobody knows how many there would be.
+    by_tile = replace(job_of(world, routes), routes=object())
+    assert by_tile.off_rasters(2) == 0

@@ -78,3 +78,23 @@ def test_a_file_is_read_from_its_beginning_to_its_end(tmp_path, data):
     assert checked.tell() == 0
     assert checked.read() == data
     assert checked.read() == b""
+
+
+@pytest.mark.parametrize("size", [0, SIZE - 1, SIZE + 1])
+def test_a_part_of_another_size_is_told_by_it_before_it_is_read(tmp_path, data, size):
+    part = part_in(tmp_path)
+    (tmp_path / "part.bin").write_bytes((data + b"?")[:size])
+    with pytest.raises(StoreError) as caught, part.open():
+        pass
+    (fault,) = caught.value.faults
+    assert (fault.expected, fault.got) == (f"{SIZE} bytes", f"{size} bytes")
+
+
+def test_a_part_that_is_as_it_was_is_read(tmp_path, data):
+    with part_in(tmp_path).open() as source:
+        assert source.size() == SIZE
+        assert source.read(9) == data[:9]
+    small = data[:500]
+    (tmp_path / "part.bin").write_bytes(small)
+    with part_in(tmp_path).open() as source:
+        assert source.read() == small

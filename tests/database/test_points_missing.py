@@ -1,5 +1,6 @@
 """A search for the nearest points of a database that has none, and points of other cells."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -49,3 +50,30 @@ def test_points_of_cells_that_a_database_lacks_are_refused(tmp_path):
     assert best.id in fault.got
     roads = read_points(part, lattice, CellPlan(plan.crs, ()))
     assert set(roads.best_server.tolist()) == {-1}
+
+
+def reads(database):
+    """All ways to read points or levels of a database."""
+    cell = database.cell_ids[0]
+    return {
+        "points": database.points,
+        "levels": lambda: database.cell_points(cell),
+        "field": database.field,
+    }
+
+
+@pytest.mark.parametrize("name", ["points", "levels", "field"])
+@pytest.mark.parametrize(("rows", "cols"), [(0, 1), (0, -1), (-30, 0)])
+def test_points_of_another_lattice_are_refused(database, name, rows, cols):
+    """They would lie in other places: numbers count by the columns."""
+    lattice = database.lattice
+    other = replace(lattice, rows=lattice.rows + rows, cols=lattice.cols + cols)
+    with pytest.raises(StoreError) as caught:
+        reads(replace(database, lattice=other))[name]()
+    (fault,) = caught.value.faults
+    assert (fault.expected, fault.hint) == ("points on the database's lattice", "parts mixed up")
+
+
+def test_points_of_the_lattice_are_read(database):
+    for read in reads(database).values():
+        read()

@@ -214,3 +214,25 @@ def test_the_least_speed_of_fixes_that_go_on_is_one_of_them():
     times_s = 2.5 * np.arange(5)
     places = np.column_stack([50.0 + 1.5 * times_s, np.zeros(5)])
     assert after(times_s, places, 16.0, rests=True)[1].ruling is Ruling.CARRIED
+
+
+@pytest.mark.parametrize(
+    ("stated_m2", "gone_m", "far_m"),
+    # 55 squared deviations: of 10 m, of the least of 7.5 m, and beyond twice the way since then.
+    [(100.0, 0.0, sqrt(5500.0)), (1.0, 0.0, sqrt(55.0) * 7.5), (100.0, 20.0, sqrt(5500.0) + 40.0)],
+)
+def test_how_far_a_fix_is_that_has_jumped(stated_m2, gone_m, far_m):
+    for off_m, jumped in ((far_m - 0.1, False), (far_m + 0.1, True)):
+        given = np.array([0.6, -0.8]) * off_m, np.eye(2), stated_m2 * np.eye(2)
+        record, found = AGREED.at_fix(ComparedFix(1.0, *given, False, False, gone_m), WAITS)
+        assert found.ruling is Ruling.OUTLIER
+        assert record.rows[0].has_jumped is jumped
+
+
+def test_fixes_that_contradict_are_no_burst_until_it_is_over():
+    assert not FixRecord().is_over
+    record, _ = after(range(3), [[200.0, 0.0]] * 3)
+    assert (record.is_over, record.is_lost) == (False, True)
+    later = record.at_time(2.0 + 60.1)
+    assert (later.is_over, later.is_lost) == (True, False)
+    assert FixRecord(rows=record.rows).is_lost

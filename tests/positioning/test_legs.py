@@ -113,6 +113,25 @@ def test_a_leg_is_whole_once_another_such_step_would_be_too_much(steps, whole):
     assert leg_of(*(MotionStep(length_m, 0.5) for length_m in steps)).is_whole is whole
 
 
+def test_where_none_waits_nothing_has_been_gone():
+    assert (0, 0.0, 0.0, 0.0, 0.0, 0.0, DeadReckoning(), None) == NO_LEG
+    assert leg_of(MotionStep(0.0, 1.0)) is NO_LEG
+
+
+def test_the_sums_of_a_leg_are_those_of_its_steps():
+    steps = MotionStep(3.0, 0.0, sampling_sd_m=0.3), MotionStep(4.0, 0.75, sampling_sd_m=0.4)
+    leg = leg_of(*steps)
+    east_m, north_m = 3.0 + 4.0 * np.cos(0.75), 4.0 * np.sin(0.75)
+    assert leg[:6] == pytest.approx((2, 7.0, 25.0, east_m, north_m, 0.25))
+    assert (leg.since, leg.first) == (DeadReckoning(), steps[0])
+    assert leg.equal_rows == pytest.approx(49 / 25)
+    assert leg.step.step_m == pytest.approx(np.hypot(east_m, north_m))
+    assert leg.step.heading_rad == pytest.approx(np.arctan2(north_m, east_m))
+    assert leg.step.sampling_sd_m == pytest.approx(0.5)
+    here = DeadReckoning().moved(steps[0]).moved(steps[1])
+    assert leg.gone_m(here) == pytest.approx((east_m, north_m))
+
+
 def test_a_leg_ends_at_a_corner_and_before_it_is_too_long():
     leg = leg_of(*[MotionStep(2.0, 0.0)] * 3)
     assert leg.joined(MotionStep(1.0, 0.7), DeadReckoning()).rows == 4

@@ -171,3 +171,19 @@ def test_levels_that_no_prediction_has_count_by_the_weight_of_levels():
     assert heavy.shared.other_log_likelihood == pytest.approx(
         2 * other.shared.other_log_likelihood, rel=1e-6
     )
+
+
+def test_the_map_at_a_place_is_that_of_its_pixel_whatever_the_shape_of_the_area():
+    """At centres, row 0 in the north; beyond the edge that of the nearest pixel."""
+    rows, cols = MODEL.log_map.shape
+    assert (rows, cols) == (7, 9)
+    east_m, north_m = 10.0 * np.arange(cols) + 5.0, HEIGHT_M - 10.0 * np.arange(rows) - 5.0
+    places = np.array(np.meshgrid(east_m, north_m), dtype=np.float32).reshape(2, -1)
+    found = MODEL._log_map_at(places).reshape(rows, cols)
+    np.testing.assert_allclose(found, MODEL.log_map, atol=1e-5)
+    assert np.ptp(found[:, 4]) > 0.1
+    beyond = np.array([[45.0, 45.0], [HEIGHT_M + 50.0, -50.0]], dtype=np.float32)
+    np.testing.assert_allclose(MODEL._log_map_at(beyond), MODEL.log_map[[0, -1], 4], atol=1e-5)
+    between = np.array([[45.0], [HEIGHT_M - 10.0]], dtype=np.float32)
+    mean = MODEL.log_map[:2, 4].mean()
+    np.testing.assert_allclose(MODEL._log_map_at(between), [mean], atol=1e-5)
