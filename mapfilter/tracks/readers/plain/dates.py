@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from mapfilter._types import Floats
+from mapfilter.clocks.named_dates import dates_in_name
 from mapfilter.tracks.readers.plain.mapped import Mapped
 from mapfilter.tracks.readers.texts.columns import Columns
 
-_DATE = "date"
+_DATE, _DATE_OF_NAME = "date", "date in the name of the file"
 _A_DATE = re.compile(r"(\d{4}([-./])\d{1,2}\2\d{1,2}|\d{1,2}([-./])\d{1,2}\3\d{4})\.?")
 """With four digits of the year: others may be a version, such as 4.2.15."""
 _OF_DAY = re.compile(r"\d{1,2}:\d\d")
@@ -40,7 +42,8 @@ def with_dates(mapped: Mapped) -> Mapped:
     """Return columns with times of day after the dates of a column of their own, if there is one.
 
     That is the column ``date``, else the only one that is no field's and begins with a date. Both
-    may be digits without separators, such as 20260501 or 010526 and 101530.
+    may be digits without separators, such as 20260501 or 010526 and 101530. Without such a column
+    it is the date in the name of the file.
     """
     rows, name = mapped.rows, mapped.rows.find(*mapped.names("time"))
     if name is None or name == _DATE:
@@ -56,9 +59,26 @@ def with_dates(mapped: Mapped) -> Mapped:
     found = [one for one in others if _A_DATE.fullmatch(rows.first_text(one))]
     if rows.has(_DATE):
         found = [_DATE]
+    if not found:
+        return _of_the_name(mapped, name)
     if len(found) != 1:
         return mapped
     return _joined(mapped, rows, found[0], name)
+
+
+def _of_the_name(mapped: Mapped, name: str) -> Mapped:
+    """Return columns with times of day after the only date in the name of the file, if it has one.
+
+    The name is that of the file alone: a folder may hold logs of several days.
+    """
+    reading = mapped.rows.reading
+    days = {str(day) for day in dates_in_name(Path(reading.path.name))}
+    if len(days) != 1 or name in mapped.beside:
+        return mapped
+    day = days.pop()
+    reading.note(f"time: times of day without a date: those of {day}, by the name of the file")
+    rows = mapped.rows.with_column(_DATE_OF_NAME, day).joined(_DATE_OF_NAME, name)
+    return replace(mapped, rows=rows, beside=(_DATE_OF_NAME,), date=_DATE_OF_NAME)
 
 
 def _joined(mapped: Mapped, rows: Columns, date: str, name: str) -> Mapped:
