@@ -107,3 +107,12 @@ def test_a_fraction_behind_a_blank(tmp_path, times, elapsed_s, note):
     since_s = log.gnss["time_s"] - log.gnss["time_s"].iloc[0]
     assert since_s.tolist() == pytest.approx(elapsed_s, abs=1e-5)
     assert any(f"{note}" in one and "behind a blank" in one for one in log.notes) == bool(note)
+
+
+@pytest.mark.parametrize(
+    ("name", "day"), [("a.csv", "2026-05-13"), ("2013-05-26.csv", "2013-05-26")]
+)
+def test_dates_of_six_digits(tmp_path, name, day):
+    log = read(tmp_path, "date,time", ["260513,100058", "260513,100059"], name)
+    assert starts_on(log, f"{day} 10:00:58")
+    assert any(f"(260513: {day}, not" in note for note in log.notes)

@@ -10,6 +10,7 @@ import numpy as np
 
 from mapfilter._types import Floats
 from mapfilter.clocks.named_dates import dates_in_name
+from mapfilter.clocks.short_years import nearest
 from mapfilter.tracks.readers.plain.mapped import Mapped
 from mapfilter.tracks.readers.texts.columns import Columns
 
@@ -101,7 +102,9 @@ def _of_digits(mapped: Mapped, name: str) -> Mapped:
         given = np.unique(rows.texts(date)[rows.with_digits(date)].astype(np.str_)).tolist()
         if not (given and all(map(_DIGITS.fullmatch, given)) and _are_of_day(rows.number(name))):
             return mapped
-        orders = _orders(given)
+        days = _orders(given)
+        near = nearest(days, lambda: rows.other_dates((date,))) if len(days) > 1 else ""
+        orders = [near] if near else _usual(days)
         if not orders:
             return mapped
         if len(orders) > 1:
@@ -111,7 +114,9 @@ def _of_digits(mapped: Mapped, name: str) -> Mapped:
             return mapped
         order = rows.reading.date_order = orders[0]
         if order != next(iter(_ORDERS)):
-            rows.reading.note(f"{date}: {order}")
+            others = [str(some[0]) for one, some in days.items() if one != order]
+            beside = f" ({given[0]}: {days[order][0]}, not {others[0]})" if others else ""
+            rows.reading.note(f"{date}: {order}{beside}")
     changed = rows.rewritten(r"^\s*(\d{1,6}(?:\.\d*)?)\s*$", r"00000\1", name)
     changed = changed.rewritten(r"^\d*(\d\d)(\d\d)(\d\d)(\.\d*)?$", r"\1:\2:\3\4", name)
     changed = changed.rewritten(r"^\s*(\d{5})\s*$", r"0\1", date)
@@ -124,9 +129,9 @@ def _are_of_day(number: Floats) -> bool:
     return bool(np.count_nonzero(of_day) >= _LEAST_OF_DAY * np.count_nonzero(known))
 
 
-def _orders(given: list[str]) -> list[str]:
-    """Return in which orders dates of digits may be written."""
-    found = []
+def _orders(given: list[str]) -> dict[str, list[np.datetime64]]:
+    """Return the days of dates of digits in each order in which they may be written."""
+    found: dict[str, list[np.datetime64]] = {}
     whole = all(len(one) == _WHOLE for one in given)
     for order in list(_ORDERS)[:1] if whole else list(_ORDERS)[1:]:
         pattern, by = _ORDERS[order]
@@ -135,9 +140,15 @@ def _orders(given: list[str]) -> list[str]:
             days = np.array(written, dtype="datetime64[D]")
         except ValueError:
             continue
-        if whole or (days.min() >= _FIRST_DAY and days.max() < _LAST_DAY):
-            found.append(order)
+        if whole or days.max() < _LAST_DAY:
+            found[order] = list(days)
     return found
+
+
+def _usual(days: dict[str, list[np.datetime64]]) -> list[str]:
+    """Return the orders of recent days; one with the whole year needs none."""
+    whole = next(iter(_ORDERS))
+    return [order for order, some in days.items() if order == whole or min(some) >= _FIRST_DAY]
 
 
 def seconds_in_digits(number: Floats) -> Floats:

@@ -116,7 +116,7 @@ class Columns:
         if column is None:
             return parse_times(rows.texts(*names), zone, layout, after_s)
         later = partial(self._later, self.find(*names) or "")
-        others = partial(self._other_dates, names)
+        others = partial(self.other_dates, names)
         found = written_times(column, zone, layout, after_s, reading.date_order, later, others)
         reading.date_order = found.order or reading.date_order
         for note in found.notes:
@@ -130,7 +130,8 @@ class Columns:
             if column is not None:
                 yield column
 
-    def _other_dates(self, own: Sequence[str]) -> list[np.datetime64]:
+    def other_dates(self, own: Sequence[str]) -> list[np.datetime64]:
+        """Return dates of the file's name, and of other columns than these."""
         taken = {*own, self.reading.date_column}
         firsts = [self.first_text(name) for name in self.names]
         return other_dates(self.reading.path, self.names, firsts, taken)
