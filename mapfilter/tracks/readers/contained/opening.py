@@ -77,7 +77,7 @@ def read_any(
     if suffix in _LAYERS and _begins(path, _BEGINS_OF_LAYERS):
         from mapfilter.tracks.readers.contained.sheets_and_layers import layer_of
 
-        return layer_of(path, _PEEKED_ROWS if most_bytes >= 0 else -1)
+        return layer_of(path, _PEEKED_ROWS if most_bytes >= 0 else -1, own)
     # Of many in a folder, as parts of results, none is a journey unless it is named.
     if suffix in _FRAMES and most_bytes < 0 and _begins(path, _BEGINS_OF_FRAMES):
         from mapfilter.tracks.readers.contained.data_frames import frame_of
