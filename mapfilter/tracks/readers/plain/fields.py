@@ -8,6 +8,7 @@ from difflib import get_close_matches
 from itertools import permutations
 
 from mapfilter.errors import Faults
+from mapfilter.tracks.readers.plain.foreign_names import FOREIGN
 
 _UNIT_WORDS = {
     "_mps": "m/s",
@@ -108,7 +109,11 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
     },
 }
 FIELDS: Mapping[str, tuple[str, ...]] = {
-    field: tuple(dict.fromkeys([*names, *(name.replace("_", " ") for name in names)]))
+    field: tuple(
+        dict.fromkeys(
+            [*names, *(name.replace("_", " ") for name in names), *FOREIGN.get(field, ())]
+        )
+    )
     for field, names in _NAMES.items()
 }
 """Fields that a column map may name, and the names of columns that are known without one."""

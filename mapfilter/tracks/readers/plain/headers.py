@@ -8,10 +8,11 @@ from typing import TypeAlias
 
 from mapfilter._header_units import UNITS, parted_unit, quantity_of
 from mapfilter.tracks.readers.plain.fields import FIELDS, is_of_axis, usual_fields
+from mapfilter.tracks.readers.plain.foreign_names import FOREIGN_QUANTITIES
 from mapfilter.tracks.readers.plain.misspelt import meant
 from mapfilter.tracks.readers.plain.served_names import served_name
 
-QUANTITIES: Mapping[str, tuple[str, ...]] = {
+_QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "time": (
         *("time", "timestamp", "date time", "local time", "unix time", "epoch time"),
         *("event time", "message time", "measurement time", "record time", "log time", "fix time"),
@@ -86,6 +87,9 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
         )
         for axis in "xyz"
     },
+}
+QUANTITIES: Mapping[str, tuple[str, ...]] = {
+    field: (*words, *FOREIGN_QUANTITIES.get(field, ())) for field, words in _QUANTITIES.items()
 }
 """Words for the quantity of a field, in any order; times of the first of several columns."""
 
