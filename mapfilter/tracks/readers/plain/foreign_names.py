@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping
 
 FOREIGN: Mapping[str, tuple[str, ...]] = {
     "time": (
-        *("uhrzeit", "zeitstempel", "heure", "horodatage", "hora"),
+        *("uhrzeit", "heure", "horodatage", "hora"),
         *("时间", "gnss时间", "gps时间", "時間", "日時", "時刻"),
     ),
     "lat_deg": ("breitengrad", "latitud", "纬度", "緯度"),
@@ -34,6 +34,11 @@ FOREIGN_QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "course_deg": ("rumbo", "cap", "航向", "航向角"),
 }
 """Words for quantities, beside a unit."""
+
+BESIDE_PLACES = frozenset(
+    name for field in ("speed_mps", "course_deg") for name in FOREIGN_QUANTITIES[field]
+)
+"""Words that mean those of a receiver beside positions; alone they may be of a vehicle."""
 
 ENCODINGS = ("gb18030", "cp932")
 """Of Chinese and Japanese texts that spreadsheets save as CSV."""

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from mapfilter._header_units import UNITS, parted_unit, quantity_of
 from mapfilter.tracks.readers.plain.fields import FIELDS, is_of_axis, usual_fields
-from mapfilter.tracks.readers.plain.foreign_names import FOREIGN_QUANTITIES
+from mapfilter.tracks.readers.plain.foreign_names import BESIDE_PLACES, FOREIGN_QUANTITIES
 from mapfilter.tracks.readers.plain.misspelt import meant
 from mapfilter.tracks.readers.plain.served_names import served_name
 
@@ -171,6 +171,10 @@ def stated_fields(
                 continue
             if rank < ranks.get(field, len(QUANTITIES[field])):
                 found[field], ranks[field] = name, rank
+    if not {"lat_deg", "lon_deg"} <= {*taken, *found}:
+        for field in ("speed_mps", "course_deg"):
+            if field in found and parted_unit(found[field])[0] in BESIDE_PLACES:
+                del found[field]
     return {field: found[field] for field in QUANTITIES if field in found}
 
 
@@ -207,7 +211,7 @@ def fields_meant(column: str) -> tuple[str, ...]:
     (('speed_mps', 'speed_kmh'), ('step_m', 'steps'), ('accuracy_m',), ())
     """
     text, unit = parted_unit(column)
-    if not unit and "[" in text:
+    if (not unit and "[" in text) or text in BESIDE_PLACES:
         return ()
     some = [
         one
