@@ -29,7 +29,7 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
     "time": (
         *("time", "time_s", "timestamp", "datetime", "utc", "unix_time", "date_time", "t"),
         *("timestamps", "timestep_time", "time_utc_usec"),
-        *("ts", "time_stamp", "epoch", "unix_timestamp", "tst", "isotst"),
+        *("ts", "time_stamp", "epoch", "unix_timestamp", "tst", "isotst", "datetimeiso"),
         *("measured_at", "recorded_at", "tow", "tow_s", "gps_tow", "time_of_week"),
         "yyyy-mo-dd hh-mi-ss_sss",
     ),
@@ -98,7 +98,12 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
         f"{sensor}_{axis}": tuple(
             name
             for word in (sensor, *others)
-            for name in (f"{word}_{axis}", f"{word}{axis}", f"{word}_{axis}_{unit}")
+            for name in (
+                f"{word}_{axis}",
+                f"{word}{axis}",
+                f"{word}.{axis}",
+                f"{word}_{axis}_{unit}",
+            )
         )
         for sensor, unit, others in (
             ("acc", "mps2", ("accel", "accelerometer", "acceleration")),

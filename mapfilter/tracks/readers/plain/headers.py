@@ -82,7 +82,7 @@ _QUANTITIES: Mapping[str, tuple[str, ...]] = {
         f"{sensor}_{axis}": tuple(f"{word} {axis}" for word in words)
         for sensor, words in (
             ("acc", ("acc", "accel", "accelerometer", "acceleration")),
-            ("gyr", ("gyr", "gyro", "gyroscope", "angular velocity")),
+            ("gyr", ("gyr", "gyro", "gyroscope", "angular velocity", "rate of rotation")),
             ("mag", ("mag", "magnetometer", "magnetic field")),
         )
         for axis in "xyz"
@@ -163,7 +163,7 @@ def stated_fields(
     found: dict[str, str] = {}
     ranks: dict[str, int] = {}
     for name in names:
-        if name in columns or names.count(name) > 1:
+        if name in columns:
             continue
         text, unit = parted_unit(name)
         for field, rank in _fields_of(text).items():
