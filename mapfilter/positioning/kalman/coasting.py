@@ -181,7 +181,7 @@ class Coasting(EqualByValue):
             return Separation()
         after = one.heard(*fix)
         probability = _probability(after.nats, self._prior(one, time_s))
-        is_next = time_s - one.heard_s >= _HEARD_S and one.expects(*fix) <= _LIMIT
+        is_next = time_s - one.heard_s >= _HEARD_S
         return Separation(probability, after if is_next else one)
 
     def again(self, time_s: float, place_m: Floats, stated_m2: Floats) -> Coasting:
