@@ -128,20 +128,13 @@ class Coast(NamedTuple):
         covariance = 0.5 * (covariance + covariance.T)
         return self._replace(mean=mean, covariance=covariance, heard_s=time_s)
 
-    def expects(self, time_s: float, place_m: Floats, stated_m2: Floats) -> float:
-        """Return the squared distance of a fix from where it may be, in deviations."""
-        row = self._row(time_s)
-        off_m = place_m - row @ self.mean
-        whole_m2 = row @ self.covariance @ row.T + self.times * stated_m2
-        return float(off_m @ np.linalg.solve(whole_m2, off_m))
-
     @property
     def nats(self) -> float:
         """Logarithm of the odds that fixes are wrong, before the prior ones, at the last fix."""
         by, by2 = self.mean[_BY], self.covariance[_BY, _BY]
         first = _ASIDE_M**2
         if not self.is_aside:
-            first = _LED_MPS**2 + _WALK_MPS_PER_SQRT_S**2 * (self.heard_s - self.begun_s)
+            first = _LED_MPS**2 + _WALK_MPS_PER_SQRT_S**2 * max(self.heard_s - self.begun_s, 0.0)
         squared = float(by @ np.linalg.solve(by2, by))
         return 0.5 * squared + 0.5 * log(float(np.linalg.det(by2)) / first**2)
 

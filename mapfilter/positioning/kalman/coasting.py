@@ -35,9 +35,8 @@ from mapfilter.positioning.sensors.pace import WALKERS_MPS
 _APART_S, _YOUNGEST_S, _OLDEST_S, _KEPT_S = 30.0, 55.0, 150.0, 600.0
 """Time between two beliefs that are kept, ages at which they are compared, and for how long one is
 kept that contradicts fixes: spoofing ends some time, and steps that were wrong are right again."""
-_HEARD_S, _LIMIT = 15.0, 13.8
-"""Time between two fixes whose way is used, as errors of those in a row are much the same, and
-squared distance from where they may be beyond which one is not."""
+_HEARD_S = 15.0
+"""Time between two fixes whose way is used, as errors of those in a row are much the same."""
 _LED, _RETURNED, _RETURNS_S = 3e-3, 0.2, 90.0
 """Prior odds that fixes are wrong: usual ones, and ones that come back after a gap, which fade."""
 _WALKED_S, _DRIVEN_S, _LOOKED_S = 30.0, 300.0, 180.0
