@@ -209,6 +209,8 @@ def test_a_held_belief_ends_as_fixes_agree_with_it_or_with_steps():
     assert not held.is_back
     back = held.again(61.0, np.array([3.0, 0.0]), 9.0 * np.eye(2))
     assert back.is_back
+    # Until one of the two has given way, the fix has not made the one that it contradicts right.
+    assert back.apart == held.apart
     assert back.is_known(np.array([3.0, 0.0]), 9.0 * np.eye(2), np.array([100.0, 0.0]))
     assert not back.is_known(np.array([3.0, 0.0]), 9.0 * np.eye(2), np.array([20.0, 0.0]))
     assert not back.is_known(np.array([60.0, 0.0]), 9.0 * np.eye(2), np.array([300.0, 0.0]))

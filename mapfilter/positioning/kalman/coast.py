@@ -8,7 +8,7 @@ do those of a receiver that has come back aside. Both are unknown, and component
 u the speed by which fixes are led, and c the time since they may have been, or u how far they lie
 aside, and c = 1. Turns tell u from errors of headings and lengths, as these turn with the way and u
 does not. That fixes are right is u = 0, so the odds of both are those of the densities of u = 0 by
-what was known of u before them and after (Dickey 1971).
+what was known of u before them and after (the Savage-Dickey ratio; Dickey 1971).
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ _LED_MPS, _ASIDE_M = 1.0, 60.0
 of some m/s, as receivers lose what jumps (Humphreys 2013)."""
 _WALK_MPS_PER_SQRT_S = 0.01
 """Random walk of the speed by which fixes are led."""
+_LIMIT = 13.8
+"""Squared distance in deviations that one in a thousand fixes exceeds."""
 _PLANE = np.eye(2)
 
 
@@ -52,7 +54,7 @@ class Coast(NamedTuple):
     is_aside : bool
         Whether fixes may have come back aside when it began, and not be led since then.
     heard_s : float
-        Time of the last fix whose way is in it; of its beginning before.
+        Time of the last fix whose way is in it; minus infinity before the first.
     """
 
     begun_s: float
@@ -127,6 +129,15 @@ class Coast(NamedTuple):
         covariance -= gain @ seen
         covariance = 0.5 * (covariance + covariance.T)
         return self._replace(mean=mean, covariance=covariance, heard_s=time_s)
+
+    def is_beyond(self, time_s: float, place_m: Floats, stated_m2: Floats) -> bool:
+        """Return whether a fix lies farther aside than one may come back."""
+        if not self.is_aside:
+            return False
+        row = self._row(time_s)
+        off_m = place_m - row @ self.mean
+        whole_m2 = row @ self.covariance @ row.T + self.times * stated_m2
+        return float(off_m @ np.linalg.solve(whole_m2, off_m)) > _LIMIT
 
     @property
     def nats(self) -> float:

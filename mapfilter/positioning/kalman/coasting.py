@@ -4,15 +4,16 @@ A spoofer leads fixes away so slowly that each agrees with a belief that has fol
 before; a receiver that was jammed may come back beside the place. What contradicts them is where
 dead reckoning has led from before: each half minute the belief is kept as it is, and goes on
 without fixes (solution separation; Brown & McBurney 1988, and coasted inertial monitors,
-Tanıl et al. 2018). For the last place ``p`` of each of these, of a covariance P, and a fix z,
+Tanıl et al. 2018), but for their way (:mod:`mapfilter.positioning.kalman.coast`). For the speed u
+by which fixes would be led, known with a covariance U at first and V by now,
 
-    odds = o N(z - p; P + W) / N(z - p; P + R),
+    odds = o N(0; 0, U) / N(0; u, V);
 
-R of a right fix, W of a wrong one; o are prior odds, larger for a while after fixes had been
-missing. Steps may be wrong as well, with the prior odds of usual fixes; so both beliefs stay as
-likely as each other where all of them disagree.
+o are prior odds, larger for a while after fixes had been missing. Steps may be wrong as well, with
+the prior odds of usual fixes; so both beliefs stay as likely as each other where all of them
+disagree. Fixes that the belief rejects are back where they are at the place of one that is held.
 
-The same distances show by how much fixes understate what lasts of their errors
+Distances of younger ones show by how much fixes understate what lasts of their errors
 (:mod:`mapfilter.positioning.kalman.understated`).
 """
 
@@ -49,7 +50,8 @@ compared then; from the other on one that was held shows nothing."""
 _GAP_S, _LONGER = 20.0, 3.0
 """Time without a fix that is a gap, and how much longer than that between the last two it is."""
 _WRONG_M2, _MOST_NATS = 60.0**2 * np.eye(2), 50.0
-"""Covariance of wrong fixes, beside that of right ones, and the most that a fix says of both."""
+"""Covariance of wrong fixes, beside that of right ones, where a rejected one is looked at, and the
+most that fixes say of both."""
 _DOUBTED, _FAR_M = 0.2, 50.0
 """Probability of a belief without fixes, and its distance, from which on nothing is claimed."""
 _REGAINED, _KNOWN = 6.0, 4.0
@@ -180,7 +182,7 @@ class Coasting(EqualByValue):
             return Separation()
         after = one.heard(*fix)
         probability = _probability(after.nats, self._prior(one, time_s))
-        is_next = time_s - one.heard_s >= _HEARD_S
+        is_next = time_s - one.heard_s >= _HEARD_S and not one.is_beyond(*fix)
         return Separation(probability, after if is_next else one)
 
     def again(self, time_s: float, place_m: Floats, stated_m2: Floats) -> Coasting:
