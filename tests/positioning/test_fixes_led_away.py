@@ -228,7 +228,8 @@ def test_a_held_belief_ends_as_fixes_agree_with_it_or_with_steps():
 
 def test_a_belief_without_fixes_goes_where_steps_lead():
     motion = np.eye(5), np.diag([4.0, 4.0, 0, 0, 0]), np.array([1.0, 2.0, 0, 0, 0])
-    state = compared(Coasting(kept=(coast(),)), 60.0, 400.0).moved(motion, np.zeros(5))
+    state = Coasting(kept=(coast(),), apart=Separation(0.5, coast()), is_held=True)
+    state = state.moved(motion, np.zeros(5))
     for one in (state.kept[0], state.apart.coast):
         np.testing.assert_array_equal(one.mean[:5], [1, 2, 0, 0, 0])
         np.testing.assert_array_equal(np.diag(one.covariance)[:5], [104, 104, 0, 0, 0])

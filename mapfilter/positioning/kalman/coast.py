@@ -131,9 +131,7 @@ class Coast(NamedTuple):
         return self._replace(mean=mean, covariance=covariance, heard_s=time_s)
 
     def is_beyond(self, time_s: float, place_m: Floats, stated_m2: Floats) -> bool:
-        """Return whether a fix lies farther aside than one may come back."""
-        if not self.is_aside:
-            return False
+        """Return whether a fix is farther away than one may be led, by what is known of that."""
         row = self._row(time_s)
         off_m = place_m - row @ self.mean
         whole_m2 = row @ self.covariance @ row.T + self.times * stated_m2
