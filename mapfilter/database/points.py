@@ -14,7 +14,7 @@ from mapfilter.database.parquet import check_places, read_columns, text_codes
 from mapfilter.errors import InputError, StoreError, fail
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
-from mapfilter.roads.ways import half_width_of
+from mapfilter.roads.widths import half_width_of
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

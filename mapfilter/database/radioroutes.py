@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,7 +23,9 @@ from mapfilter.database.points import Points, read_points, way_columns
 from mapfilter.errors import InputError, fail
 from mapfilter.lattice import Lattice, checked_bounds
 from mapfilter.radio.cells import CellPlan
-from mapfilter.roads.ways import Bounds
+
+if TYPE_CHECKING:
+    from mapfilter.roads.ways import Bounds
 
 Rows = Ints32
 

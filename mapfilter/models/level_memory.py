@@ -6,13 +6,14 @@ all hypotheses of a belief; the means and the odds of faults are theirs.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from math import exp, log
 from typing import Any
 
 import numpy as np
 
+from mapfilter._changes import changed
 from mapfilter._device import arrays_of
 from mapfilter._types import Floats, Floats32, Ints, Ints32
 from mapfilter.models.level_covariance import absence_gains, aged, sequential_updates
@@ -204,7 +205,7 @@ class LevelMemory:
         kept[placed(2 * slots + 1 + at)] = self.errors.fault_log_odds
         other_dbm, other_db2, used = self.other_dbm.copy(), self.other_db2.copy(), self.used.copy()
         other_dbm[at], other_db2[at], used[at] = OTHER_DBM, OTHER_SD_DB**2, self.reports
-        return replace(
+        return changed(
             self,
             band=band,
             prior_db2=prior,
@@ -225,7 +226,7 @@ class LevelMemory:
             (self.other_dbm, OTHER_DBM, keep),
             (self.other_db2, OTHER_SD_DB**2, keep**2),
         )
-        memory = replace(self, covariance_db2=covariance, other_dbm=other_dbm, other_db2=other_db2)
+        memory = changed(self, covariance_db2=covariance, other_dbm=other_dbm, other_db2=other_db2)
         return memory._with_slots_of(self), decay
 
     def updated(
@@ -256,7 +257,7 @@ class LevelMemory:
             _NEGLIGIBLE / 10,
         )
         used[slot] = self.reports
-        memory = replace(
+        memory = changed(
             self,
             covariance_db2=covariance,
             other_dbm=other_dbm,
@@ -269,7 +270,7 @@ class LevelMemory:
 
     def with_other(self, log_likelihood: float) -> LevelMemory:
         """Return the memory with the last report's log-likelihood under wrong predictions."""
-        return replace(self, other_log_likelihood=log_likelihood)._with_slots_of(self)
+        return changed(self, other_log_likelihood=log_likelihood)._with_slots_of(self)
 
     def _with_slots_of(self, before: LevelMemory) -> LevelMemory:
         """Take over the look-up of slots from a memory with the same bands."""

@@ -139,6 +139,9 @@ def _is_well(epoch: Any) -> bool:
 
 
 def _are_rows(given: Any) -> bool:
+    # Of tuples, as epochs have mostly, that is known at once.
+    if type(given) is tuple:
+        return True
     return isinstance(given, Sequence) and not isinstance(given, str | bytes)
 
 

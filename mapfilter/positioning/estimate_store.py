@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import geopandas
 import numpy as np
 import pyarrow.parquet as pq
-import shapely
 from pyarrow.lib import ArrowException
 
 from mapfilter._arrow import open_parquet
@@ -41,6 +39,10 @@ def write_estimate(estimate: TrackEstimate, path: str | Path) -> None:
     OutputError
         The folder cannot be written.
     """
+    # Slow to import; a replay does it while another process draws.
+    import geopandas
+    import shapely
+
     located = np.isfinite(estimate.east_m) & np.isfinite(estimate.north_m)
     points = np.full(len(estimate), None, dtype=object)
     points[located] = shapely.points(estimate.east_m[located], estimate.north_m[located])

@@ -121,7 +121,9 @@ def draw_base(
         _draw_scale_bar(axes, base.bounds_m[2] - base.bounds_m[0])
         arrow = Look(arrowstyle="-|>", color=BLACK, linewidth=1.4, shrinkA=1)
         at = Look(xycoords="axes fraction", textcoords="offset points", arrowprops=arrow)
-        axes.annotate("N", (north_at, 0.985), (0, -38), **at, **MAP_NAME, fontsize=9.5, zorder=19)
+        north = axes.annotate("N", (north_at, 0.985), (0, -38), **at, **MAP_NAME, fontsize=9.5)
+        # It lies within the map, and where takes long to find out.
+        north.set(zorder=19, in_layout=False)
     return frame
 
 

@@ -64,6 +64,8 @@ _STYLE: dict[Any, Any] = {
     "axes.labelsize": 10,
     "axes.linewidth": 0.8,
     "axes.titlesize": 11,
+    # As nothing is above the axes, matplotlib would find the same, at each layout anew.
+    "axes.titley": 1.0,
     "figure.facecolor": "white",
     "font.family": ["DejaVu Sans"],
     "font.size": 10,

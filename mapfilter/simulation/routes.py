@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from mapfilter._types import Bools, Floats, Ints
 from mapfilter.errors import InputError, fail
-from mapfilter.roads.network import StreetNetwork
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
+
+    from mapfilter.roads.network import StreetNetwork
 
 _STARTS = 50
 

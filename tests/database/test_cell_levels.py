@@ -15,7 +15,7 @@ from mapfilter.database.tiles import TileRows, places_table, received_levels
 from mapfilter.errors import StoreError
 from mapfilter.lattice import Lattice
 from mapfilter.roads.lattice import RouteLattice
-from mapfilter.roads.ways import half_width_of
+from mapfilter.roads.widths import half_width_of
 
 NO_CELL = "S0.Q"
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mapfilter.roads.ways import half_width_of
+from mapfilter.roads.widths import half_width_of
 
 
 @pytest.mark.parametrize(

@@ -106,7 +106,8 @@ def test_what_locates_imports_neither_what_draws_nor_what_reads_maps_and_rasters
     """Else the process that draws would save nothing; asked of a process of its own."""
     code = (
         "import sys, mapfilter.workflows.replay as _\n"
-        "print(*{'matplotlib', 'rasterio', 'pyogrio', 'scipy.sparse', 'numba'} & set(sys.modules))"
+        "print(*{'matplotlib', 'rasterio', 'pyogrio', 'scipy.sparse', 'shapely', 'geopandas', "
+        "'numba'} & set(sys.modules))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert (done.returncode, done.stdout.split()) == (0, ["numba"]), done.stderr
@@ -116,6 +117,8 @@ def test_a_replay_of_a_track_log_imports_no_readers_of_recordings_and_no_page():
     """They are a sixth of the modules of its own; asked of a process of its own."""
     others = {"mapfilter.tracks.joining.combine", "mapfilter.tracks.readers.formats"}
     others |= {"mapfilter.viewing.bundle", "mapfilter.survey.measured_map"}
+    # They locate single reports, which is done when the track is located.
+    others |= {"mapfilter.positioning.fingerprints." + name for name in ("locating", "sources")}
     code = (
         "import sys, mapfilter.config.load, mapfilter.workflows.replay, "
         "mapfilter.workflows.replays.text\n"

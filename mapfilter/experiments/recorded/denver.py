@@ -30,7 +30,7 @@ from mapfilter.lattice import Lattice
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.roads.route_points import RouteSource
-from mapfilter.roads.ways import half_width_of
+from mapfilter.roads.widths import half_width_of
 from mapfilter.tracks.deadreckoning import steps_between
 from mapfilter.tracks.log import TrackLog, make_log
 

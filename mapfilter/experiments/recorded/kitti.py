@@ -29,7 +29,7 @@ from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.roads.raster import raster_lattice, read_raster_ways
 from mapfilter.roads.route_points import RouteSource
-from mapfilter.roads.ways import half_width_of
+from mapfilter.roads.widths import half_width_of
 from mapfilter.tracks.deadreckoning import dead_reckon
 from mapfilter.tracks.log import TrackLog, make_log
 from mapfilter.tracks.readers.formats import read_recording

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from mapfilter._changes import changed
 from mapfilter._device import PROCESSOR, Device
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.hypotheses import NEAR_M
@@ -224,7 +225,7 @@ class BayesPositioner(Filter[BayesState]):
             started = weighing.new_beliefs.from_evidence(updates, state, epoch, rng)
             if started is not None:
                 belief, sources = started
-                state = replace(state, belief=belief, sources={**state.sources, **sources})
+                state = changed(state, belief=belief, sources={**state.sources, **sources})
         elif state.belief is not given.belief or not wait or not wait(travelled_m):
             # Else nothing is read of it.
             moved_only = state.belief
@@ -235,7 +236,7 @@ class BayesPositioner(Filter[BayesState]):
             if state.belief is not None:
                 belief, status = report(before, state.belief, state.status)
                 if belief is not state.belief or status is not state.status:
-                    state = replace(state, belief=belief, status=status)
+                    state = changed(state, belief=belief, status=status)
                 positioned = gnss_of(state).was_used(epoch.time_s)
                 state = judged(self.beliefs, state, weighed=used, positioned=positioned)
         elif given.status is Status.UNCERTAIN:
@@ -245,9 +246,9 @@ class BayesPositioner(Filter[BayesState]):
         if gnss.was_used(epoch.time_s):
             last_fix = state.last_fix if epoch.gnss is None else epoch.gnss
             watch = state.watch.positioned(epoch.time_s)
-            state = replace(state, last_fix=last_fix, watch=watch)
+            state = changed(state, last_fix=last_fix, watch=watch)
         elif epoch.gnss is not None and gnss.rejecting:
-            state = replace(state, watch=state.watch.contradicted())
+            state = changed(state, watch=state.watch.contradicted())
         if reason not in _TOLD_ELSEWHERE:
             # Of a report without a serving cell, the first one.
             named = (row.cell for row in epoch.radio if row.cell is not None)
@@ -310,4 +311,4 @@ def _tracked(state: BayesState) -> BayesState:
     """Return a state as TRACKING where only its last report was in doubt, and not its belief."""
     if not (state.contested or state.status is Status.UNCERTAIN):
         return state
-    return replace(state, status=Status.TRACKING, contested=False)
+    return changed(state, status=Status.TRACKING, contested=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import isfinite, nan
 
 from mapfilter.filters.contract import Reason, Status
@@ -40,7 +39,7 @@ def step_output(
         if not leg.rows:
             return state, output
     state, east_m, north_m = _gone_on(state, known)
-    fix = replace(known.output.fix, time_s=time_s, east_m=east_m, north_m=north_m, reason=reason)
+    fix = known.output.fix.gone_on(time_s, east_m, north_m, reason)
     return state, StepOutput(fix, known.output.evidence, unused, known.output.tail)
 
 

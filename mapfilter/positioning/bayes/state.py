@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from math import nan, sqrt
 from typing import Any, NamedTuple
 
+from mapfilter._changes import changed
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 from mapfilter.filters.contract import Status
@@ -135,7 +136,7 @@ class BayesState:
 
     def with_output(self, reported: Reported) -> BayesState:
         """Return the state with its output."""
-        return replace(self, reported=reported)
+        return changed(self, reported=reported)
 
     def begun_anew(self) -> BayesState:
         """Return the state without its belief, of which nothing is left, or nothing is to be used.
@@ -143,7 +144,7 @@ class BayesState:
         What was found out beside it, too, begins with the next one.
         """
         found = self.status in (Status.CONVERGED, Status.TRACKING, Status.UNCERTAIN)
-        return replace(
+        return changed(
             self,
             belief=None,
             status=Status.LOST if found else self.status,

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mapfilter._changes import changed
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.grid import GridBelief
 from mapfilter.positioning.bayes.area.area_frame import AreaFrame
@@ -92,7 +93,7 @@ class Weighing:
             if update.state is not state.sources[source.name]:
                 states[source.name] = update.state
             if update.belief or update.alternative:
-                state = replace(
+                state = changed(
                     state,
                     belief=update.belief or state.belief,
                     alternative=update.alternative or state.alternative,
@@ -100,7 +101,7 @@ class Weighing:
         if any(update.refuted for update in updates):
             return self.collected(given.begun_anew(), epoch, particle_spacing_m)
         if states:
-            state = replace(state, sources={**state.sources, **states})
+            state = changed(state, sources={**state.sources, **states})
         return state, updates
 
     def weighed(
@@ -130,7 +131,7 @@ class Weighing:
         if info.reason is Reason.NO_CANDIDATES_LEFT and not belief.count:
             return state.begun_anew(), info.reason
         if info.reason is not Reason.USED:
-            return replace(state, belief=belief), info.reason
+            return changed(state, belief=belief), info.reason
         off_nats = off_nats_per_m(beliefs, state)
         null = challenged(rules, state.null, reading, before, belief, off_nats)
         alternative = state.alternative
@@ -163,10 +164,10 @@ class Weighing:
             begun = self.new_beliefs.alternative(state, now.belief, epoch, contradiction, rng)
             started = disputed and begun is not now.alternative
             count = state.alternatives + started
-            after = replace(after, alternative=begun, alternatives=count)
+            after = changed(after, alternative=begun, alternatives=count)
         if lanes is not None or state.twin is not None:
             twin = self.new_beliefs.twin(after, lanes, reading, rng, now.taken_over)
-            after = replace(after, twin=twin)
+            after = changed(after, twin=twin)
         more = tuple(term for one in updates for term in one.rival_terms)
         shared = replace(evidence, terms=(*evidence.terms, *more)) if more else evidence
         after = self._rivals.turned(after, shared, epoch.time_s, measured=measured)

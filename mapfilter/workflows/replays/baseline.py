@@ -1,11 +1,14 @@
-"""The baseline of a replay: the same reports, each located by itself, without motion."""
+"""The baseline of a replay: the same reports, each located by itself, without motion.
+
+They are located while pictures are drawn, so what that needs is imported then.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,20 +16,14 @@ from mapfilter._types import Bools, Floats
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.errors import InputError
 from mapfilter.evaluation.accuracy import mean_of, percentile_m
-from mapfilter.positioning.fingerprints.censoring import Bounds, bounds_of
-from mapfilter.positioning.fingerprints.locating import (
-    ReportLocator,
-    fit_locator,
-    locate_by,
-    timed_share,
-    usual_readings,
-)
-from mapfilter.positioning.fingerprints.matches import located_once
 from mapfilter.positioning.fingerprints.options import Probabilistic, method_name
-from mapfilter.positioning.fingerprints.reports import Reports
-from mapfilter.positioning.fingerprints.sources import reports_of_database, reports_of_logs
 from mapfilter.propagation.shadowing import named_rng
 from mapfilter.tracks.log import TrackLog
+
+if TYPE_CHECKING:
+    from mapfilter.positioning.fingerprints.censoring import Bounds
+    from mapfilter.positioning.fingerprints.locating import ReportLocator
+    from mapfilter.positioning.fingerprints.reports import Reports
 
 MOST_REPORTS = 300
 """Reports of a log that are located, evenly taken."""
@@ -98,6 +95,8 @@ class Baselines:
 
     @cached_property
     def _known(self) -> Reports | None:
+        from mapfilter.positioning.fingerprints.sources import reports_of_database
+
         assert self._database is not None
         try:
             return reports_of_database(self._database)
@@ -106,6 +105,9 @@ class Baselines:
 
     def of(self, log: TrackLog) -> SingleReports | None:
         """Return the errors of a log's single reports; None without truth, reports or cells."""
+        from mapfilter.positioning.fingerprints.locating import locate_by
+        from mapfilter.positioning.fingerprints.sources import reports_of_logs
+
         database = self._database
         if database is None or not database.cell_ids or log.radio.empty or log.truth.empty:
             return None
@@ -124,6 +126,14 @@ class Baselines:
         return SingleReports(of_truth.size, count, error_m, within)
 
     def _locator(self, tried: Reports) -> ReportLocator:
+        from mapfilter.positioning.fingerprints.censoring import bounds_of
+        from mapfilter.positioning.fingerprints.locating import (
+            fit_locator,
+            timed_share,
+            usual_readings,
+        )
+        from mapfilter.positioning.fingerprints.matches import located_once
+
         strongest, bounds = usual_readings(tried), bounds_of(tried)
         # In tenths, so that logs share locators.
         timed = round(timed_share(tried), 1)

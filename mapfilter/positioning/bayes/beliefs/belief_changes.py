@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mapfilter._changes import changed
 from mapfilter.angles import wrap_rad
 from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.filters.grid import GridBelief
@@ -105,7 +106,7 @@ def moved_as_read(
 ) -> HeldOtherwise:
     """Return a belief beside the main one, moved by a step as it reads it."""
     as_read = one.hold.read(measured)
-    return replace(one, belief=predict(one.belief, assumed(as_read, one.belief), rng)[0])
+    return changed(one, belief=predict(one.belief, assumed(as_read, one.belief), rng)[0])
 
 
 def assumed(step: MotionStep, belief: MapBelief) -> MotionStep:

@@ -8,6 +8,7 @@ from math import isfinite, nan
 
 import numpy as np
 
+from mapfilter._changes import changed
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.beliefs.belief_changes import carried_on
@@ -247,7 +248,7 @@ class _Move:
 
     def after(self, watch: SensorWatch) -> BayesState:
         """Return the state after the motion, with that of the sensors."""
-        return replace(
+        return changed(
             self.state,
             belief=self.beliefs.main,
             reckoning=self.reckoning,

@@ -20,6 +20,7 @@ from math import hypot, isfinite, log, nan, radians
 
 import numpy as np
 
+from mapfilter._changes import changed
 from mapfilter.angles import wrap_one_rad, wrap_rad
 from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.filters.copies import copies_of
@@ -221,8 +222,8 @@ def _compared(
 ) -> HeldOtherwise:
     """Return a belief with the distance since which it is likely enough."""
     if not _leads(rules, one, main):
-        return replace(one, ahead_m=nan)
-    return one if isfinite(one.ahead_m) else replace(one, ahead_m=travelled_m)
+        return changed(one, ahead_m=nan)
+    return one if isfinite(one.ahead_m) else changed(one, ahead_m=travelled_m)
 
 
 def is_ahead(

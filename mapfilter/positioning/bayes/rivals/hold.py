@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import isfinite, radians
 
 from mapfilter.angles import wrap_one_rad, wrap_rad
@@ -35,7 +35,15 @@ class Hold:
         if self.is_as_measured or not isfinite(step.heading_rad):
             return step
         direction_rad = self.direction_rad(step.heading_rad)
-        return replace(step, heading_rad=direction_rad, turn_rad=self.sign * step.turn_rad)
+        return MotionStep(
+            step.step_m,
+            direction_rad,
+            self.sign * step.turn_rad,
+            step.spread_m,
+            step.sampling_sd_m,
+            step.turned_sd_rad,
+            step.rows,
+        )
 
     def direction_rad(self, heading_rad: float) -> float:
         """Return the direction that a heading stands for."""

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from mapfilter._changes import changed
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters, MapFilter
@@ -74,12 +75,12 @@ class Rivals:
         held = still_open(holds, found, main, state.reckoning.travelled_m)
         refuted = (one for one, now in zip(state.held, weighed, strict=True) if now is None)
         half_turns = state.half_turns.after(found, held, main).with_refuted(refuted)
-        state = replace(state, half_turns=half_turns)
+        state = changed(state, half_turns=half_turns)
         best = winner(holds, held, main, rules.converge_log_odds)
         if best is None:
-            return replace(state, held=held)
+            return changed(state, held=held)
         own = {one.name: one.beside_other(state.sources[one.name]) for one in self.sources}
-        return replace(_taken_over(state, best, own), held=after_takeover(held, best))
+        return changed(_taken_over(state, best, own), held=after_takeover(held, best))
 
     def unaided(
         self,
@@ -128,10 +129,10 @@ class Rivals:
                 proven = proven or (one.from_scratch and not still)
         best = winner(pulls, left, main, rules.converge_log_odds)
         if best is None:
-            return replace(state, unaided=tuple(left), proven=proven)
+            return changed(state, unaided=tuple(left), proven=proven)
         own = {one.name: one.distrusted(state.sources[one.name], time_s) for one in self.sources}
         taken_over = _taken_over(state, best, own)
-        return replace(taken_over, held=(), proven=True, alone_from_m=best.start_m)
+        return changed(taken_over, held=(), proven=True, alone_from_m=best.start_m)
 
     def _weighed(
         self,
@@ -157,7 +158,7 @@ class Rivals:
         null = challenged(rules, one.null, reading, one.belief, belief)
         if belief.status is Status.CONVERGED:
             belief = replace(belief, status=Status.TRACKING)
-        return replace(one, belief=belief, null=null)
+        return changed(one, belief=belief, null=null)
 
 
 def _proves(rules: PullRules, one: HeldOtherwise | None, main: ParticleBelief) -> bool:
@@ -174,7 +175,7 @@ def _proves(rules: PullRules, one: HeldOtherwise | None, main: ParticleBelief) -
 
 def _taken_over(state: BayesState, best: HeldOtherwise, own: dict[str, Any]) -> BayesState:
     """Return a state whose belief has been replaced by a rival, with the states of sources."""
-    return replace(
+    return changed(
         state,
         belief=best.belief,
         status=Status.TRACKING,
