@@ -9,7 +9,6 @@ from shutil import rmtree
 from typing import Any
 
 from sphinx.application import Sphinx
-from sphinx.domains.python import PythonDomain
 from sphinx.pycode.parser import Parser
 
 # Pages are kept until the end: the search among them for unused cycles takes a tenth of a build.
@@ -41,7 +40,7 @@ run_path(str(Path(__file__).with_name("notebook_files.py")))["write_all"](
 )
 
 # Which object a short name in a docstring means.
-_MEANT = run_path(str(Path(__file__).with_name("meant_names.py")))
+_NAMES = run_path(str(Path(__file__).with_name("kept_names.py")))["Names"]
 
 # Pages of modules that are gone would stay and fail the next build.
 rmtree(Path(__file__).parent / "api", ignore_errors=True)
@@ -79,37 +78,6 @@ def _sidebar_of_modules(
         context["toctree"] = lambda **given: whole(**{**given, **less})
 
 
-class _Names(PythonDomain):
-    """The names of Python, where what was looked up is kept.
-
-    Short names of types in docstrings are compared with all names that there are. Of several
-    objects the order would be that in which processes have read pages.
-    """
-
-    _found: dict[tuple[object, ...], list[Any]] | None = None
-    _imported: dict[str, dict[str, str]] | None = None
-
-    def find_obj(self, env: Any, *sought: Any) -> list[Any]:
-        """Return the object of a name; pages are resolved when all of them have been read."""
-        if self._found is None:
-            self._found = {}
-        if sought not in self._found:
-            found = super().find_obj(env, *sought)
-            module, _, name, _, by_ending = sought
-            self._found[sought] = (
-                self._meant(found, module or "") if by_ending and "." not in name else found
-            )
-        return list(self._found[sought])
-
-    def _meant(self, found: list[Any], module: str) -> list[Any]:
-        if self._imported is None:
-            self._imported = {}
-        if module not in self._imported:
-            self._imported[module] = _MEANT["imported_names"](module)
-        names = _MEANT["meant"]([name for name, _ in found], module, self._imported[module])
-        return [one for one in found if one[0] in names]
-
-
 def _find_no_definitions(_parser: Parser) -> None:
     """Leave out the lines of definitions, which pages with sources alone would need.
 
@@ -119,6 +87,6 @@ def _find_no_definitions(_parser: Parser) -> None:
 
 def setup(app: Sphinx) -> None:
     """Connect what is done to pages before the theme (at 500) is."""
-    app.add_domain(_Names, override=True)
+    app.add_domain(_NAMES, override=True)
     Parser.parse_definition = _find_no_definitions
     app.connect("html-page-context", _sidebar_of_modules, priority=400)

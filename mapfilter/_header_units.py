@@ -73,6 +73,9 @@ _OTHER_NAMES = {
     **dict.fromkeys(("kmh", "kph", "kmph", "km_h", "kmh-1"), "km/h"),
     **dict.fromkeys(("mi/h", "milesperhour"), "mph"),
     **dict.fromkeys(("kn", "kt", "kts", "knot"), "knots"),
+    **dict.fromkeys(("nudos", "noeuds", "nœuds", "knoten", "节", "ノット"), "knots"),
+    **dict.fromkeys(("grados", "degrés", "度"), "deg"),
+    **dict.fromkeys(("米", "メートル"), "m"),
     **dict.fromkeys(("fps",), "ft/s"),
     **dict.fromkeys(("radps", "rads-1", "rad_s"), "rad/s"),
     **dict.fromkeys(("degps", "dps", "degs-1", "deg_s"), "deg/s"),
@@ -117,7 +120,7 @@ _BEGINNINGS = {
     "mag_": ("magnetic field", "ut"),
     "time": ("time", "s"),
 }
-_BRACKETS = re.compile(r"\[([^\[\]]*)\]\s*$|\(([^()]*)\)\s*$")
+_BRACKETS = re.compile(r"\[([^\[\]]*)\]\s*$|[(（]([^()（）]*)[)）]\s*$")
 _ENDINGS = re.compile(
     r"[_ ](km[_/]?h|kph|mph|mps|m[_/]s|knots|kn|radps|degps|dps|rad[_/]s|deg[_/]s|rad|deg|"
     r"km|cm|mm|m|ft|ms|us|ns|s|dbm|hpa)$"

@@ -2,8 +2,10 @@
 
 import gc
 import os
+import re
 from collections.abc import Callable, Generator, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +70,31 @@ def _no_waiting_for_disks(request: pytest.FixtureRequest) -> Iterator[None]:
             # Of a file that is not open this one fails as well.
             patch.setattr(os, "fsync", os.fstat)
         yield
+
+
+@pytest.fixture(scope="module")
+def _folders(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[str], Path]:
+    """Make folders of a module's tests, numbered, with the beginning of a test's name."""
+    module, number = tmp_path_factory.mktemp(request.path.stem), count()
+
+    def made(name: str) -> Path:
+        folder = module / f"{re.sub(r'[^a-z0-9]', '_', name[:30].lower())}{next(number)}"
+        folder.mkdir()
+        return folder
+
+    return made
+
+
+@pytest.fixture
+def tmp_path(request: pytest.FixtureRequest, _folders: Callable[[str], Path]) -> Path:
+    """Return a new folder of this test alone.
+
+    For its own one pytest reads the names of all folders of the tests before: of some thousand of
+    them that takes longer than most tests.
+    """
+    return _folders(request.node.name)
 
 
 @pytest.fixture(scope="module")

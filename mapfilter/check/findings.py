@@ -155,6 +155,7 @@ _BY_HINT = {
     "raster of another zone": "crs-mixed",
     "a CRS of another region": "crs-mixed",
     "a CRS of another region, or Web Mercator": "crs-mixed",
+    "east and north exchanged: systems may name north first, files hold east": "axes-swapped",
     "a raster upside down or mirrored; gdalwarp turns it": "raster-upside-down",
     "set quantity = level or loss": "quantity-unknown",
     "misspelt, or no folder of antennas": "antenna-missing",

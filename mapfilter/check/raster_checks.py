@@ -9,6 +9,7 @@ import numpy as np
 from rasterio.errors import RasterioError
 
 from mapfilter._gdal import open_raster
+from mapfilter._types import Floats32
 from mapfilter.check.copies import check_copies
 from mapfilter.check.findings import Findings
 from mapfilter.check.raster_kinds import Kind, below_free_space_db, falls_away, kind_of
@@ -16,14 +17,18 @@ from mapfilter.check.samples import RasterSample, sample_raster
 from mapfilter.errors import Fault, InputError, listed
 from mapfilter.radio.cells import CellPlan
 from mapfilter.rasters.files import (
+    POWERS,
     SIGN_NOT_READ,
     are_bytes_without_sign,
+    are_powers,
     as_stored,
     check_plausible,
 )
 from mapfilter.rasters.raster_set import RxLevRasters, in_other_case, switched_off
 
 _TOO_SMALL_DB = 10.0
+_FEW_NUMBERS, _LARGEST_BYTE = 12, 255
+"""Different numbers that cells may have, where levels have more; the largest in a byte."""
 
 
 def is_surveyed(rasters: RxLevRasters) -> bool:
@@ -192,10 +197,27 @@ def _check_kind(
     if unsigned:
         evidence += f": as losses {below_db:.0f} dB less than those of free space"
     evidence += ", which become less away from the sites" if falls else ""
-    evidence += f" ({SIGN_NOT_READ})." if no_sign else "."
+    evidence += f" ({cause})." if (cause := _cause(numbers, no_sign, falls, kind)) else "."
     ids = listed([sample.cell_id for sample in samples])
     findings.add(code, f"{rasters.path}, cells {ids}", evidence)
     return falls
+
+
+def _cause(numbers: Floats32, no_sign: bool, falls: bool, kind: Kind) -> str:
+    """Return the likely cause of numbers of another kind, where they tell more than the kind."""
+    if no_sign:
+        return SIGN_NOT_READ
+    if are_powers(numbers):
+        return POWERS
+    whole = bool((numbers == np.round(numbers)).all())
+    if kind == "rxlev" and whole and np.unique(numbers).size <= _FEW_NUMBERS:
+        return "if they are numbers of cells, it is a raster of the best server, without levels"
+    if falls and whole and numbers.min() >= 0 and numbers.max() <= _LARGEST_BYTE:
+        return (
+            "or whole numbers with an offset, as RSRP + 140: gdal_translate -a_offset -140 "
+            "FROM.tif TO.tif states it, with the offset of the tool"
+        )
+    return ""
 
 
 def strongest(samples: Sequence[RasterSample], plan: CellPlan, quantity: str) -> dict[str, float]:

@@ -44,7 +44,7 @@ _UTC = re.compile(r"\s{0,3}\b(?:UTC|GMT)\s{0,3}$")
 _ZONED = r"(?:Z|z|[+-]\d\d:?\d\d|(?::\d\d|T\d{4,6})(?:[.,]\d{1,9})?\s?[+-]\d\d)\s*$"
 """Ends of times that state their zone: whole hours only after a time of day, not after a month."""
 _PLAIN_TIME = r"^(?:[01]\d|2[0-3]):[0-5]\d:[0-5]\d(?:\.\d{1,9})?$"
-_TIME = re.compile(r"([01]?\d|2[0-3]):([0-5]\d):([0-5]\d|60)(?:[.,](\d{1,9}))?", re.ASCII)
+_TIME = re.compile(r"([01]?\d|2[0-3]):([0-5]\d):([0-5]\d|60)(?:[., ](\d{1,9}))?", re.ASCII)
 
 
 def utc_from_gps_s(gps_s: ArrayLike) -> Floats:
@@ -181,10 +181,12 @@ def _with_whole_day(found: re.Match[str]) -> str:
 def seconds_of_day(texts: pa.Array) -> Floats:
     """Read times of day ``HH:MM:SS`` with or without a fraction, NaN for other texts.
 
+    The fraction may be behind a point, a comma or a blank.
+
     Examples
     --------
-    >>> seconds_of_day(pa.array(["15:42:01.744", "9:00:00,5", "23:59:60", "25:00:00", ""])).tolist()
-    [56521.744, 32400.5, 86400.0, nan, nan]
+    >>> seconds_of_day(pa.array(["15:42:01.744", "9:00:00,5", "23:59:60 5", "25:00:00"])).tolist()
+    [56521.744, 32400.5, 86400.5, nan]
     """
     trimmed = pc.utf8_trim_whitespace(texts)
     plain = pc.match_substring_regex(trimmed, _PLAIN_TIME)

@@ -6,7 +6,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from mapfilter._types import Floats
+from mapfilter._types import Floats, Ints
+from mapfilter.clocks.short_years import Dates, nearest
 from mapfilter.clocks.times import LEAST_UNIX_S
 
 _COMPACT = r"^((?:19|20)\d\d)(\d\d)(\d\d)(\d\d)(\d\d)(\d\d)"
@@ -28,7 +29,7 @@ _DAY = rf"{_DAY_OF_WEEK}(\w{{3}}) +(\d\d?) ({_CLOCK})"
 _IN_PLACE = (
     # The time of day before the date.
     (
-        r"^(\d\d?:\d\d(?::\d\d(?:\.\d{1,9})?)?)\s+(\d{1,4}[-/.]\d\d?[-/.]\d{1,4})$",
+        r"^(\d\d?:\d\d(?::\d\d(?:[. ]\d{1,9})?)?)\s+(\d{1,4}[-/.]\d\d?[-/.]\d{1,4})$",
         r"\2 \1",
     ),
     # A comma before the time of day, as a browser writes it, or a hyphen. A date of XML may end in
@@ -40,8 +41,9 @@ _IN_PLACE = (
     (r"^(\S+\s)(\d\d?)\.(\d\d)\.(\d\d)(\D|$)", r"\1\2:\3:\4\5"),
     # A comma for the point of a fraction, which is a blank in quotes.
     (
-        r"^(\d{1,4}[/.-]\d\d?[/.-]\d{1,4}[ T]\d\d?:\d\d:\d\d)\s(\d{1,9})$",
-        r"\1.\2",
+        r"^(\d{1,4}[/.-]\d\d?[/.-]\d{1,4}[ T]\d\d?:\d\d:\d\d)\s(\d{1,9})"
+        r"(\s?(?:Z|[AaPp]\.?[Mm]\.?|[+-]\d\d(?::?\d\d)?|UTC|GMT))?$",
+        r"\1.\2\3",
     ),
     # An offset behind the name of UTC, of one digit or of two.
     (r"\s(?:GMT|UTC)([+-])(\d)$", r"\10\2:00"),
@@ -111,30 +113,49 @@ def are_compact(numbers: Floats) -> bool:
     return bool(count > _LEAST_TIMES * np.count_nonzero(numbers >= LEAST_UNIX_S))
 
 
-def order_of(column: pa.ChunkedArray) -> str:
+def order_of(column: pa.ChunkedArray, others: Dates = tuple) -> str:
     """Return whether dates with the year at the end begin with the day or the month.
+
+    Parameters
+    ----------
+    column : pyarrow.ChunkedArray of str
+    others : callable
+        Dates near which that of the right order lies.
 
     Returns
     -------
     str
-        "day" or "month" where a number above 12 shows it, and none the contrary; else "".
+        "day" or "month" where a number above 12 shows it, and none the contrary, or other dates;
+        else "".
 
     Examples
     --------
     >>> order_of(pa.chunked_array([["01/05/2026 10:00:00", "13/05/2026 10:00:00"]]))
     'day'
-    >>> order_of(pa.chunked_array([["01/05/2026 10:00:00", "02/05/2026 10:00:00"]]))
-    ''
+    >>> unclear = pa.chunked_array([["01/05/2026 10:00:00", "02/05/2026 10:00:00"]])
+    >>> order_of(unclear), order_of(unclear, lambda: [np.datetime64("2026-01-05")])
+    ('', 'month')
     """
     dates = pc.unique(pc.utf8_slice_codeunits(pc.utf8_trim_whitespace(column), 0, 10))
-    parts = pc.extract_regex(dates, r"^(?P<first>\d\d?)[/-](?P<second>\d\d?)[/-](?:19|20)\d\d")
-    late = {}
-    for name in ("first", "second"):
-        number = pc.cast(pc.struct_field(parts, name), pa.int64())
-        late[name] = bool(pc.any(pc.greater(number, _LAST_MONTH)).as_py())
-    if late["first"] == late["second"]:
+    parts = pc.extract_regex(
+        dates, r"^(?P<first>\d\d?)[/-](?P<second>\d\d?)[/-](?P<year>(?:19|20)\d\d)"
+    )
+    first, second, year = (
+        pc.cast(pc.struct_field(parts.drop_null(), name), pa.int64()).to_numpy(zero_copy_only=False)
+        for name in ("first", "second", "year")
+    )
+    late = [bool((one > _LAST_MONTH).any()) for one in (first, second)]
+    if late[0] != late[1]:
+        return "day" if late[0] else "month"
+    if all(late) or not first.size:
         return ""
-    return "day" if late["first"] else "month"
+    readings = {"day": (second, first), "month": (first, second)}
+    return nearest({o: _days(year, *one) for o, one in readings.items()}, others)
+
+
+def _days(year: Ints, month: Ints, day: Ints) -> list[np.datetime64]:
+    months = (12 * (year - 1970) + month - 1).astype("datetime64[M]")
+    return list(months.astype("datetime64[D]") + (day - 1))
 
 
 def has_year_last(column: pa.ChunkedArray) -> bool:

@@ -11,10 +11,17 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from mapfilter._types import Floats
+from mapfilter.clocks.blank_fractions import with_whole_milliseconds
 from mapfilter.clocks.named_zones import with_offsets
 from mapfilter.clocks.ordinal_dates import with_calendar_days
 from mapfilter.clocks.plain_times import plain_times
-from mapfilter.clocks.short_years import SHORT_YEAR, short_order, with_long_years
+from mapfilter.clocks.short_years import (
+    SHORT_YEAR,
+    Dates,
+    short_order,
+    short_readings,
+    with_long_years,
+)
 from mapfilter.clocks.times import LEAST_UNIX_S, parse_times, unix_seconds
 from mapfilter.clocks.written_dates import (
     are_compact,
@@ -59,6 +66,7 @@ def written_times(
     after_s: float = nan,
     order: str = "",
     later: Later | None = None,
+    others: Dates = tuple,
 ) -> WrittenTimes:
     """Read a column of times.
 
@@ -71,6 +79,8 @@ def written_times(
         That of the dates of parts before this one.
     later : callable, optional
         Asked where the order is unclear: a date with a day above 12 may come later.
+    others : callable
+        Asked then as well: dates near which these lie, as that of the file's name.
 
     Examples
     --------
@@ -86,19 +96,23 @@ def written_times(
     if layout != "ISO8601":
         column = pc.utf8_trim_whitespace(column)
         return WrittenTimes(*parse_times(_texts(column), zone, layout, after_s))
-    column, order, notes = in_iso_order(column, zone, order, later)
+    column, order, notes = in_iso_order(column, zone, order, later, others)
     time_s, zoned = parse_times(_texts(column), zone, layout, after_s)
     return WrittenTimes(time_s, zoned, order, notes)
 
 
 def in_iso_order(
-    column: pa.ChunkedArray, zone: str = "", order: str = "", later: Later | None = None
+    column: pa.ChunkedArray,
+    zone: str = "",
+    order: str = "",
+    later: Later | None = None,
+    others: Dates = tuple,
 ) -> tuple[pa.ChunkedArray, str, tuple[str, ...]]:
     """Return times in the order of ISO 8601, with offsets for names of zones.
 
     Parameters
     ----------
-    column, zone, order, later
+    column, zone, order, later, others
         As of :func:`written_times`.
 
     Returns
@@ -108,16 +122,17 @@ def in_iso_order(
     order : str
     notes : tuple of str
     """
+    column, on_fractions = with_whole_milliseconds(column)
     column = with_calendar_days(plainly_written(column))
     notes: list[str] = []
     if order not in _ORDERS:
-        order, notes = _order(column, later)
+        order, notes = _order(column, later, others)
     ordered = with_long_years(with_year_first(column, order), order)
     ordered, on_zones = with_offsets(ordered, zone)
-    return ordered, order, (*notes, *on_zones)
+    return ordered, order, (*on_fractions, *notes, *on_zones)
 
 
-def _order(column: pa.ChunkedArray, later: Later | None) -> tuple[str, list[str]]:
+def _order(column: pa.ChunkedArray, later: Later | None, others: Dates) -> tuple[str, list[str]]:
     dates, more = _dates(column), iter(later() if later is not None else ())
     while True:
         short = short_order(dates)
@@ -127,10 +142,24 @@ def _order(column: pa.ChunkedArray, later: Later | None) -> tuple[str, list[str]
         if following is None:
             break
         dates = pa.chunked_array([*dates.chunks, *_dates(plainly_written(following)).chunks])
+    # A date nearby knows better than a usual year.
+    near = order_of(dates, others) or short_order(dates, others)
+    by = "" if near == order else ", by a date in the file or in its name"
+    order = order if near in ("", SHORT_YEAR) else near
     if not order:
         return "", []
-    years = "a short year" if short == order else "slashes or hyphens"
-    return order, [f"time: the {order} first in dates with {years}"]
+    years = "a short year" if short else "slashes or hyphens"
+    return order, [f"time: the {order} first in dates with {years}{by}{_rejected(dates, order)}"]
+
+
+def _rejected(dates: pa.ChunkedArray, order: str) -> str:
+    """Return in words what else the first date with a short year may be; "" for nothing else."""
+    for text in dates.to_pylist():
+        readings = short_readings(text or "")
+        if taken := readings.pop(order, ""):
+            others = sorted(set(readings.values()) - {taken})
+            return f" ({text.split()[0]}: {taken}, not {' or '.join(others)})" if others else ""
+    return ""
 
 
 def _dates(column: pa.ChunkedArray) -> pa.ChunkedArray:

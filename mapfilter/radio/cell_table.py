@@ -42,6 +42,8 @@ _JOIN_SITES = (
     "Atoll keeps positions in the table Sites; add them to each transmitter by the name of its "
     "site, or name other columns in cells.columns.east and cells.columns.north"
 )
+_LEAST_FOREIGN, _SETTINGS_SHOWN = 5, 6
+"""Columns of other names by which a list is another tool's; how many are named."""
 _POWERS = ("power", "puissance", "leistung")
 _MISSPELT = 0.75
 """Least likeness of a short name that is misspelt."""
@@ -125,7 +127,14 @@ def _check_layout(where: str, header: tuple[str, ...]) -> None:
 
 
 def _check_own_header(where: str, header: tuple[str, ...], faults: Faults) -> None:
-    """Check the columns of mapfilter's own layout, in which none has another meaning."""
+    """Check the columns of mapfilter's own layout, in which none has another meaning.
+
+    Raises
+    ------
+    InputError
+        Most columns are another tool's.
+    """
+    _check_tool(where, header)
     for name in header:
         if name not in _ALLOWED:
             hint = "name what it holds in [cells.columns]"
@@ -139,6 +148,35 @@ def _check_own_header(where: str, header: tuple[str, ...], faults: Faults) -> No
     placed = {_PLACES[name] for name in header if name in _PLACES}
     if {"lat", "lon"} & placed and {"east", "north"} & placed:
         faults.add(where, "lat and lon, or east and north", "both")
+
+
+def _check_tool(where: str, header: tuple[str, ...]) -> None:
+    """Raise InputError, with what settings read it, where most columns are another tool's."""
+    others = [name for name in header if name and name not in _ALLOWED]
+    if len(others) < _LEAST_FOREIGN or 2 * len(others) <= len(header):
+        return
+    meant: dict[str, str] = {}
+    for name in others:
+        field = _meant(name, header).partition(" meant")[0]
+        if field == "antenna":
+            low = name.lower()
+            field = "height_m" if "height" in low else "antenna" if _of_patterns(low) else ""
+        if field and field not in meant:
+            meant[field] = name
+    settings = [f'{field} = "{name}"' for field, name in meant.items()]
+    known = set(recognised(header, LAYOUTS["atoll"]))
+    places = set(recognised(header, {"": (*LAYOUTS["atoll"]["lat"], *LAYOUTS["atoll"]["east"])}))
+    such = f", such as {', '.join(settings[:_SETTINGS_SHOWN])}" if settings else ""
+    hint = f"those of another tool: name the ones of use in [cells.columns]{such}"
+    hint += "; others are ignored then"
+    if places and len(known) >= _LEAST_FOREIGN:
+        hint += f'; or set cells.layout = "atoll", which knows {len(known)} of them'
+    expected = f"columns of a cell plan ({', '.join(COLUMNS[:4])}, …)"
+    raise fail(InputError, where, expected, listed(others), hint)
+
+
+def _of_patterns(name: str) -> bool:
+    return name == "antenna" or any(word in name for word in ("model", "pattern", "type", "name"))
 
 
 def _meant(name: str, header: tuple[str, ...]) -> str:

@@ -6,6 +6,7 @@ import csv
 import io
 import math
 import zipfile
+import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -30,6 +31,9 @@ _SEPARATORS = (",", ";", "\t")
 _WIDE_SHARE = 0.4
 _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """First bytes of .xlsx and .ods, and of .xls."""
+_GZIP = b"\x1f\x8b"
+_OTHERS = {"<": "XML, such as KML", "{": "JSON", "[{": "JSON"}
+"""How files of other kinds begin, which hold no table of lines."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,10 +103,10 @@ def why_no_number(text: str) -> str:
 def read_table(path: Path, what: str) -> Table:
     """Read a table whose first line names its columns.
 
-    Text has commas, semicolons or tabs, and is UTF-8, UTF-16 or UTF-32 with a byte order mark, or
-    else Windows-1252 (with a note); a first line ``sep=;`` is no header, nor are up to ten lines of
-    a title, which fill one field each (with a note). Of a workbook (.xlsx, .xls, .ods) the first
-    sheet is read.
+    It may be packed with gzip. Text has commas, semicolons or tabs, and is UTF-8, UTF-16 or UTF-32
+    with a byte order mark, or else Windows-1252 (with a note); a first line ``sep=;`` is no header,
+    nor are up to ten lines of a title, which fill one field each (with a note). Of a workbook
+    (.xlsx, .xls, .ods) the first sheet is read.
 
     Parameters
     ----------
@@ -115,9 +119,15 @@ def read_table(path: Path, what: str) -> Table:
         The file is missing, empty, too large or no such table.
     """
     data = read_input(path, _LARGEST_BYTES, what)
+    if data.startswith(_GZIP):
+        data = _unpacked(path, data, what)
     if data.startswith(_WORKBOOKS):
         return _read_workbook(path, data, what)
     text, notes = _decoded(path, data)
+    for mark, kind in _OTHERS.items():
+        if text.lstrip().startswith(mark):
+            hint = "export the list as CSV or as a workbook, with a row for each cell"
+            raise fail(InputError, str(path), f"{what} as a table", kind, hint)
     text = without_separator_line(text)
     heads = [*islice((line for line in text.splitlines() if line.strip()), MOST_TITLES + 1)]
     separator = _separator(heads)
@@ -142,6 +152,21 @@ def read_table(path: Path, what: str) -> Table:
         expected = f"{what} of at most {MOST_COLUMNS} columns"
         raise fail(InputError, f"{path}, header", expected, len(header), "another file")
     return Table(path, separator, header, tuple(lines[1:]), notes)
+
+
+def _unpacked(path: Path, data: bytes, what: str) -> bytes:
+    """Return what is packed with gzip, as public lists of cells are."""
+    unpacker = zlib.decompressobj(wbits=31)
+    try:
+        found = unpacker.decompress(data, _LARGEST_UNPACKED_BYTES)
+    except zlib.error as error:
+        raise fail(InputError, str(path), "a gzip file", str(error), "damaged") from error
+    if unpacker.unconsumed_tail:
+        mib = _LARGEST_UNPACKED_BYTES >> 20
+        raise fail(InputError, str(path), f"{what} of at most {mib} MiB unpacked", "a larger one")
+    if not unpacker.eof:
+        raise fail(InputError, str(path), "a whole gzip file", "a part of one", "cut off")
+    return found
 
 
 def _separator(heads: Sequence[str]) -> str:

@@ -27,6 +27,9 @@ _PLAUSIBLE: dict[Quantity, tuple[float, float, str]] = {
 SIGN_NOT_READ = "negative numbers read as unsigned ones: PIXELTYPE SIGNEDINT in the .hdr"
 """The likely mistake where numbers are levels of which the highest bit is no sign."""
 
+POWERS = "powers in W or mW given for levels: dBm = 10 log10(P / 1 mW)"
+_LARGEST_POWER = 0.1
+"""Levels are whole decibels at least; a phone receives less than this in mW."""
 _LEAST_LOSS_DB = 20.0
 _LEAST_NODATA = 250.0
 
@@ -152,6 +155,18 @@ def are_bytes_without_sign(values: Floats32, factor: float) -> bool:
     return bool(stored.size and stored.min() >= 128 and stored.max() <= 255 and whole.all())
 
 
+def are_powers(values: Floats32) -> bool:
+    """Return whether numbers are those of received powers in W or mW; NaN is ignored.
+
+    Examples
+    --------
+    >>> are_powers(np.float32([1e-9, 3e-12])), are_powers(np.float32([0.0, 1e-9]))
+    (True, False)
+    """
+    lowest, highest = np.fmin.reduce(values, axis=None), np.fmax.reduce(values, axis=None)
+    return bool(lowest > 0 and highest < _LARGEST_POWER)
+
+
 def check_plausible(values: Floats32, quantity: Quantity, path: Path, factor: float = 1.0) -> None:
     """Check that numbers, multiplied by a factor, can be levels, losses or deviations.
 
@@ -179,6 +194,7 @@ def check_plausible(values: Floats32, quantity: Quantity, path: Path, factor: fl
         raise fail(InputError, where, f"a {quantity} in {low:g}..{high:g} {unit}", got, hint)
     if quantity == "level" and highest >= 0 and _most(values >= 0, values):
         got = f"{got}, mostly 0 and above"
+        hint = POWERS if are_powers(values) else hint
         raise fail(InputError, where, "levels in dBm, mostly below 0", got, hint)
     if quantity == "loss" and lowest < _LEAST_LOSS_DB and _most(values < _LEAST_LOSS_DB, values):
         expected = f"path losses, mostly above {_LEAST_LOSS_DB:g} dB"

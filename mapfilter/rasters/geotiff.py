@@ -27,6 +27,14 @@ READINGS_TAG = "READINGS_SHA256"
 QUANTITY_TAG = "MAPFILTER_QUANTITY"
 """Tag of a file that states which quantity its bands hold."""
 _UNITS: dict[str, Quantity] = {"dbm": "level", "db": "loss"}
+_FROM_POWER = "export dBm, or convert powers: dBm = 10 log10(P / 1 mW)"
+_FROM_FIELD = "export received levels in dBm: those of a field depend on the frequency"
+_OTHER_UNITS = {
+    **dict.fromkeys(("w", "mw", "nw", "pw", "watt", "watts", "milliwatt"), _FROM_POWER),
+    **dict.fromkeys(("dbw",), "export dBm, or add 30 dB"),
+    **dict.fromkeys(("dbuv/m", "dbuv", "v/m", "mv/m", "uv/m", "dbu"), _FROM_FIELD),
+}
+"""Units of other quantities, and what to do about them."""
 _KINDS: tuple[Quantity, ...] = ("level", "loss", "deviation")
 _INDEX_ENTRY_BYTES = 4
 _MOST_BLOCKS_LOOKED_AT = 20_000
@@ -78,6 +86,7 @@ def open_geotiff(path: Path, cell_id: str, declared: Declared) -> GeoTiff:
                 names = names if described else (cell_id,)
                 _check_bands(str(path), names, source.dtypes, faults)
                 _check_scale(str(path), source, declared.factor, faults)
+                _check_units(str(path), source, faults)
                 lattice = _lattice(str(path), source, declared.crs, not caught, faults)
                 quantity, tagged = _quantity(source), QUANTITY_TAG in source.tags()
                 # Those beside it, such as .aux.xml, change what is read.
@@ -137,9 +146,14 @@ def _lattice(
             "a raster upside down or mirrored; gdalwarp turns it",
         )
         faults.add(f"{where}, transform", "row 0 in the north, column 0 in the west", got, hint)
+    elif crs is None:
+        # Of degrees the sides of a pixel are of no use.
+        return None
     elif abs(t.a + t.e) > _SQUARE_TOLERANCE * t.a:
-        faults.add(f"{where}, transform", "square pixels", f"{t.a:g} m x {-t.e:g} m")
-    elif crs is not None:
+        side = f"{min(t.a, -t.e):g}"
+        hint = f"gdalwarp -tr {side} {side} -r bilinear {Path(where).name} TO.tif makes them square"
+        faults.add(f"{where}, transform", "square pixels", f"{t.a:g} m x {-t.e:g} m", hint)
+    else:
         return Lattice(crs, t.c, t.f, t.a, source.height, source.width)
     return None
 
@@ -151,6 +165,14 @@ def _check_scale(where: str, source: Any, factor: float, faults: Faults) -> None
         expected = f"no factor, as the file states its own scale, {scale:g}, which is applied"
         hint = "leave the factor out; gdal_translate -unscale writes numbers without a scale"
         faults.add(f"{where}, scale", expected, f"a factor of {factor:g}", hint)
+
+
+def _check_units(where: str, source: Any, faults: Faults) -> None:
+    """Check that the bands' unit is none of another quantity, whatever is declared."""
+    for unit in sorted({(unit or "").strip() for unit in source.units}):
+        if hint := _OTHER_UNITS.get(unit.lower().replace("\u00b5", "u").replace("\u03bc", "u")):
+            expected = "levels in dBm, or losses in dB"
+            faults.add(f"{where}, unit", expected, repr(unit), hint)
 
 
 def _check_bands(where: str, names: tuple[str, ...], dtypes: Sequence[str], faults: Faults) -> None:

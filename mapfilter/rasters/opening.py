@@ -42,6 +42,17 @@ FORMATS: Mapping[str, Opener] = {
     ".flt": open_raw_grid,
 }
 """Formats of raster files by suffix. A new one needs its module and a line here."""
+_OTHER_FORMATS: Mapping[tuple[str, ...], str] = {
+    (".bin", ".dat", ".raw"): "pixels without a header, as of Planet: rename it to .bil, and write "
+    "a .hdr beside it from the tool's index (NROWS, NCOLS, NBITS 16, BYTEORDER M or I, XLLCORNER, "
+    "YLLCORNER, CELLSIZE)",
+    (".grc",): "classes of Vertical Mapper, without levels: export a .grd, which gdal_translate "
+    "FROM.grd TO.tif converts",
+    (".xyz", ".txt", ".csv", ".tab"): "points as text are no rasters: gdal_translate FROM.xyz "
+    "TO.tif converts east, north and value of all pixels in rows; else name them as "
+    "prediction.survey.files",
+}
+"""By suffix what else lies in folders of exports, and how it becomes a raster."""
 _MOST_FILES = 100_000
 _FEW_FILES = 3
 """Files with the same fault are reported one by one; of more the first ones are named."""
@@ -172,7 +183,7 @@ def _listed(folder: Path) -> list[Path]:
     if not found:
         expected = f"raster files ({', '.join(FORMATS)}) or an index of them"
         others = sorted(path.name for path in folder.iterdir() if path.is_file())
-        hint = f"gdal_translate FROM TO.tif converts others, such as {others[0]}" if others else ""
+        hint = _how_to_convert(others)
         if inside := sorted(one.name for one in folder.iterdir() if is_raster_folder(one)):
             hint = f"they are in folders in it ({listed(inside)}): name one, or move all into one, "
             hint += "as for the carriers of a network"
@@ -180,6 +191,15 @@ def _listed(folder: Path) -> list[Path]:
     if len(found) > _MOST_FILES:
         raise fail(InputError, str(folder), f"at most {_MOST_FILES} rasters", len(found))
     return found
+
+
+def _how_to_convert(names: Sequence[str]) -> str:
+    """Return how files of other formats become rasters that are read; "" without any."""
+    by_suffix = {Path(name).suffix.lower(): name for name in reversed(names)}
+    for suffixes, hint in _OTHER_FORMATS.items():
+        if found := next((by_suffix[one] for one in suffixes if one in by_suffix), ""):
+            return f"{found}: {hint}"
+    return f"gdal_translate FROM TO.tif converts others, such as {names[0]}" if names else ""
 
 
 def _open(path: Path, declared: Declared, row: IndexRow | None, notes: list[str]) -> RasterFile:

@@ -179,7 +179,7 @@ class Rows:
 
     def finish(self) -> None:
         """Read the times of all rows that are no numbers, when there are no more rows."""
-        time_s, notes = self.waiting.read()
+        time_s, notes = self.waiting.read(self.path)
         self.remarks += notes
         for row, value in zip(self.waiting.rows, time_s.tolist(), strict=True):
             self.values[_PARTS * row] = value

@@ -7,11 +7,15 @@ import re
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 
 from mapfilter._types import Floats
+from mapfilter.clocks.named_dates import dates_in_name
+from mapfilter.clocks.short_years import Dates
 from mapfilter.clocks.written_times import written_times
 from mapfilter.radio.tables import number
 
@@ -75,10 +79,13 @@ class WaitingTimes:
                 self._pack()
         return math.nan
 
-    def read(self) -> tuple[Floats, tuple[str, ...]]:
-        """Return the seconds of all rows that wait, NaN for no times, and notes on them."""
+    def read(self, path: Path) -> tuple[Floats, tuple[str, ...]]:
+        """Return the seconds of all rows that wait, NaN for no times, and notes on them.
+
+        A date in the name of the file tells which number of dates is the day.
+        """
         self._pack()
-        return _read(pa.chunked_array(self._chunks, pa.string()))
+        return _read(pa.chunked_array(self._chunks, pa.string()), partial(dates_in_name, path))
 
     def text(self, which: int) -> str:
         """Return the text of one of the rows."""
@@ -96,7 +103,7 @@ def _of_a_time(text: str) -> str:
     return f"{text}{_NO_TIME}" if _DAY_ALONE.fullmatch(text.strip()) else text
 
 
-def _read(column: pa.ChunkedArray) -> tuple[Floats, tuple[str, ...]]:
-    found = written_times(column)
+def _read(column: pa.ChunkedArray, others: Dates = tuple) -> tuple[Floats, tuple[str, ...]]:
+    found = written_times(column, others=others)
     known = (found.time_s > 0) & (found.time_s < _LATEST_S)
     return np.where(known, found.time_s, np.nan), found.notes

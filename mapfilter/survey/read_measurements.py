@@ -29,7 +29,11 @@ from mapfilter.survey.options import SESSION_GAP_S
 Format = Literal["auto", "csv", "opencellid", "towercollector", "antennas"]
 _FILES_NAMED = 3
 _SUFFIXES = (".csv", ".log", ".tsv")
-_RECORDED_SUFFIXES = (".txt", ".gz")
+_RECORDED_SUFFIXES = (
+    *(".txt", ".gz", ".nmf", ".gpx", ".rec", ".json", ".jsonl", ".ndjson", ".geojson", ".kml"),
+    *(".kmz", ".xlsx", ".xls", ".ods", ".gpkg", ".parquet", ".pq"),
+)
+"""Of recordings that may hold levels, and of tables in other files."""
 _HEAD_OF_LOG = "log.json"
 _NO_CELLS = (
     "the column of cells has another name; columns.cell names it (prediction.survey.columns.cell), "
@@ -54,8 +58,8 @@ def read_measurements(
     Parameters
     ----------
     files : sequence of Path or str
-        Files, or folders whose .csv, .tsv and .log files are taken; with ``recorded`` track logs
-        and folders of them, too.
+        Files, or folders whose .csv, .tsv and .log files are taken; with ``recorded`` track logs,
+        folders of them, and recordings and tables in other files, too.
     crs : str, optional
         Projected CRS for the positions; the UTM zone of the measurements when left out.
     format : {"auto", "csv", "opencellid", "towercollector", "antennas"}

@@ -21,10 +21,13 @@ from mapfilter.workflows.descriptions.results import result_info
 
 _MAPS = (".pbf", ".osm", ".osm.gz", ".osm.bz2")
 _LAYERS = (".gpkg", ".shp", ".geojson", ".fgb")
-_TABLES = (".csv", ".txt", ".tsv", ".xlsx", ".xls", ".ods")
+_TABLES = (".csv", ".txt", ".tsv", ".cel", ".xlsx", ".xls", ".ods")
 _INDEX_COLUMN = b"TX_NAME"
 _LONGEST_LINE_BYTES = 1 << 16
-_LEAST_OF_PLAN = 2
+_HEAD_BYTES = 1 << 10
+_LEAST_OF_PLAN = _LEAST_OF_ANTENNAS = 2
+_OF_ANTENNAS = ("height_m", "azimuth_deg", "downtilt_deg", "mechanical_downtilt_deg", "eirp_dbm")
+"""Fields of which a list of antennas has two at least, and no journey."""
 _OF_MODEM = b"+QENG:"
 """In replies of a modem with cells."""
 _PLACES = {"lat", "lon", "latitude", "longitude", "x", "y", "east", "north", "mcc", "mnc"}
@@ -149,6 +152,11 @@ def _file_info(path: Path) -> dict[str, Any]:
             return found
     if suffix in _TABLES and _INDEX_COLUMN not in _first_line(path):
         return _table_info(path)
+    if begin.lstrip().startswith(b"<") and b"<kml" in begin[:_HEAD_BYTES].lower():
+        hint = (
+            "export the places of cells as CSV, and a journey with its times (gx:Track) or as GPX"
+        )
+        raise fail(InputError, str(path), _EXPECTED, "KML without times", hint)
     from mapfilter.workflows.descriptions.geo import raster_info, tiff_info
 
     if suffix in (".tif", ".tiff"):
@@ -193,10 +201,25 @@ def _table_info(path: Path) -> dict[str, Any]:
     header = [name.strip() for name in table.header]
     lower = {name.casefold() for name in header}
     held = {"columns": ", ".join(header), "rows": len(table.rows)}
-    if len((lower & _PLAN) - _PLACES) >= _LEAST_OF_PLAN:
-        return {"kind": "cell plan", **held, "use": "cells.plan"}
+    tool = _is_of_tool(header)
+    if tool or len((lower & _PLAN) - _PLACES) >= _LEAST_OF_PLAN:
+        use = 'cells.plan, with cells.layout = "atoll"' if tool else "cells.plan"
+        return {"kind": "cell plan", **held, "use": use}
     use = "with a time in each row: mapfilter convert --column; fingerprints: mapfilter locate --db"
     return {"kind": "table", **held, "use": use}
+
+
+def _is_of_tool(header: Sequence[str]) -> bool:
+    """Return whether columns are those of antennas in the list of a planning tool."""
+    from mapfilter.radio.arrange_cells import recognised
+    from mapfilter.radio.cell_layouts import LAYOUTS
+
+    known, own = LAYOUTS["atoll"], LAYOUTS["plan"]
+    antennas = {name: known[name] for name in _OF_ANTENNAS}
+    found, by_own = recognised(header, known), recognised(header, own)
+    places = recognised(header, {name: known[name] for name in ("lat", "east")})
+    several = len(recognised(header, antennas)) >= _LEAST_OF_ANTENNAS and bool(places)
+    return several and len(set(found) - set(by_own)) >= _LEAST_OF_PLAN
 
 
 def _is_geojson(path: Path) -> bool:

@@ -66,7 +66,7 @@ FILTER = (
     f"From odds of {e_to(RULES.start_log_odds)} on",
     f"as soon as it is ahead by {RULES.search_threshold:g}",
     f"while the alternative is ahead by {RULES.lost_threshold:g}:",
-    f"right with a probability of {share(RULES.claimed_from)}",
+    f"right with a probability of {share(BAYES.claim_mass)}",
     f"It starts after {number(path.PATH_M)} m",
     f"due every {number(path.LEG_M)} m",
     f"{share(BY_MAP.switch_mass)} of it in one place for {number(BY_MAP.switch_hold_m)} m",

@@ -94,7 +94,8 @@ def led_away(seed, off_m):
 @cache
 def found(seed, off_m):
     log = led_away(seed, off_m)
-    estimate = locate(log, BayesFilter().over_area(AREA), np.random.default_rng(5)).estimate
+    filter_ = BayesFilter(claim_mass=0.95).over_area(AREA)
+    estimate = locate(log, filter_, np.random.default_rng(5)).estimate
     east_m, north_m = (np.interp(estimate.time_s, log.truth["time_s"], log.truth[name])
                        for name in ("east_m", "north_m"))  # fmt: skip
     error_m = np.hypot(estimate.east_m - east_m, estimate.north_m - north_m)

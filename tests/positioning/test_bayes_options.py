@@ -40,7 +40,8 @@ def test_the_usual_options():
         "levels": True, "level_error_db": 8.7, "level_correlation_m": 200.0,
         "device_error_db": 5.0, "fault_probability": 0.06, "level_weight": 0.35,
         "report_spacing_m": 5.0, "max_particles": 20_000, "min_search_particles": 12_000,
-        "min_particles": 3000, "switch_mass": 0.995, "switch_hold_m": 20.0, "smooth": False,
+        "min_particles": 3000, "switch_mass": 0.995, "switch_hold_m": 20.0,
+        "claim_mass": 0.998, "smooth": False,
         "satellite_sd_m": 2.0, "antenna_height_m": 100.0, "antenna_height_sd_m": 200.0,
         "timing_step_m": 553.5, "timing_sd_m": 200.0, "threads": 1,
     }  # fmt: skip
@@ -132,10 +133,12 @@ def test_each_option_reaches_its_part():
     assert found.carriageways is None
 
 
-@pytest.mark.parametrize(("mass", "claimed_from"), [(0.9, 0.9), (0.95, 0.95), (0.999, 0.95)])
-def test_a_position_is_claimed_from_no_more_than_the_switch_rule_asks_for(mass, claimed_from):
-    rules = BayesFilter(switch_mass=mass).over_area(make_area()).rules
-    assert rules.claimed_from == claimed_from
+@pytest.mark.parametrize("area", [make_area(), without_cells()], ids=["cells", "map alone"])
+def test_a_position_is_claimed_as_the_option_says(area):
+    for mass in (0.9, 0.9995):
+        found = BayesFilter(switch_mass=0.97, claim_mass=mass).over_area(area)
+        assert found.rules.claimed_from == mass
+    rules = BayesFilter(claim_mass=0.9).over_area(make_area()).rules
     assert (rules.converge_log_odds, rules.map_nats_per_m) == (-12.0, 0.04)
 
 

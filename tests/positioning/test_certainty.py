@@ -5,12 +5,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from made_town import Town
 
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.certainty import Recovery, _share_near, certainty
-from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, AlternativeRules
 from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
 from mapfilter.positioning.bayes.rivals.hold import Hold
@@ -138,9 +136,3 @@ def test_masses_on_a_grid_are_not_compared_with_turned_phones():
     """Their beliefs are of hypotheses, and a grid has none beside it."""
     grid = SimpleNamespace(summary=SimpleNamespace(mass_50m=0.9))
     assert certainty(RULES, grid, rivals=[turned(2.0, 700.0)]) == 0.9
-
-
-@pytest.mark.parametrize(("switch_mass", "claimed_from"), [(0.995, 0.95), (0.9, 0.9)])
-def test_a_claim_never_asks_for_more_than_convergence(switch_mass, claimed_from):
-    positioner = BayesFilter(switch_mass=switch_mass).over_area(Town.of(1).area())
-    assert positioner.rules.claimed_from == claimed_from

@@ -49,6 +49,7 @@ class State:
     proven: bool = True
     sources: dict = field(default_factory=dict)
     reckoning: object = field(default_factory=lambda: SimpleNamespace(travelled_m=40.0))
+    watch: object = "of the epoch"
 
     @property
     def rivals(self):
@@ -57,7 +58,7 @@ class State:
 
 def judged(
     state, *, weighed=True, positioned=False, contested=False, left=False, unheard=False,
-    by_fixes=-inf,
+    by_fixes=-inf, left_share=0.0,
 ):  # fmt: skip
     rules = SimpleNamespace(claimed_from=0.95, lost_threshold=8.0, converge_log_odds=-12.0)
     beliefs = SimpleNamespace(
@@ -68,6 +69,7 @@ def judged(
         may_have_left=lambda _: left,
         is_unheard=lambda _: unheard,
         log_odds_of_fixes=lambda _: by_fixes,
+        left_share=lambda own, watch: left_share if watch is own.watch else 1.0,
     )
     return claims.judged(beliefs, state, weighed=weighed, positioned=positioned)
 
@@ -78,6 +80,13 @@ def test_a_position_is_claimed_if_it_is_certain_enough(mass, claimed):
     assert found.status is (Status.TRACKING if claimed else Status.UNCERTAIN)
     assert not found.contested
     assert found.belief == Belief(mass)
+
+
+@pytest.mark.parametrize(("mass", "share", "claimed"), [(1.0, 0.05, True), (0.99, 0.05, False)])
+def test_who_may_have_left_unnoticed_leaves_a_doubt(mass, share, claimed):
+    found = judged(State(Belief(mass)), left_share=share)
+    assert found.status is (Status.TRACKING if claimed else Status.UNCERTAIN)
+    assert not found.contested
 
 
 def test_what_converges_is_judged_by_the_rule_of_convergence():

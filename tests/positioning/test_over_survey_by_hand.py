@@ -118,7 +118,7 @@ def surveyed(monkeypatch, deviations_db=(5.0,), count=22, **more):
 def test_what_is_usual_over_a_survey():
     assert SURVEYED == {
         "level_error_db": 5.0, "level_correlation_m": 100.0, "device_error_db": 2.0,
-        "level_weight": 0.5, "switch_mass": 0.95, "switch_hold_m": 60.0,
+        "level_weight": 0.5, "switch_mass": 0.95, "switch_hold_m": 60.0, "claim_mass": 0.95,
     }  # fmt: skip
     assert SURVEYED_WAYS == {"map_sd_m": 16.0}
 

@@ -312,3 +312,30 @@ def test_turns_are_kept_while_reports_come():
     rest = turning(Rest(0.0, pace_mps=9.0, braked_mps2=9.0), [0.2] * 3)
     heard = rest.heard(3.0, (row("A", -70.0),))
     assert (heard.turned_rad, heard.turned_s) == (rest.turned_rad, 2.0)
+
+
+LATE = Rest(100.0, pace_mps=1.25, left_nats=-6.0, still_nats=-2.5)
+"""From 120 s on one may be 25 m away."""
+
+
+@pytest.mark.parametrize(
+    ("rest", "time_s", "share"),
+    [
+        # One in fifty such rests is none, e times fewer at a sum of -6, e² at -9 and 3 besides.
+        (LATE, 120.0, 0.02 * exp(-1)),
+        (replace(LATE, left_nats=-9.0), 120.0, 0.02 * exp(-1.5)),
+        (replace(LATE, left_nats=3.0), 500.0, 0.02),
+        (LATE, 119.9, 0.0),
+        (replace(LATE, measured_m=5.0), 120.0, 0.0),
+        (replace(LATE, measured_m=5.0), 124.0, 0.02 * exp(-1)),
+        # Levels cannot show it, or have shown it; or it is known to be none; or a vehicle stands.
+        (replace(LATE, still_nats=-2.4), 500.0, 0.0),
+        (replace(LATE, left_nats=-10.5), 500.0, 0.0),
+        (replace(LATE, left_nats=-10.4), 500.0, 0.02 * exp(-10.4 / 6)),
+        (replace(LATE, carried_nats=6.0), 500.0, 0.0),
+        (replace(LATE, pace_mps=2.6), 500.0, 0.0),
+    ],
+)
+def test_a_walker_may_have_left_unnoticed_until_levels_show_the_rest(rest, time_s, share):
+    odds = share / 0.98
+    assert rest.left_share(time_s) == pytest.approx(odds / (1 + odds), rel=1e-12)

@@ -19,13 +19,18 @@ HEARD = ReportRow("serving", "a", None, None, -70.0, 0)
 RADIO = SimpleNamespace(name="radio", due=lambda used_m, travelled_m: travelled_m - used_m >= 5)
 REST = Rest(0.0, pace_mps=1.4)
 DOUBTFUL = replace(REST, is_doubtful=True)
+LATE = replace(REST, since_s=-40.0)
 
 
 def rule(state=TRACKED, after=None, motion=Reason.USED, *, ahead=False, by_map=False, **measured):
     """The rule for an epoch with a step, with the sensors after it."""
     epoch = Epoch(1.0, (MotionStep(1.4, 0.3),), **measured)
     usable = UsableEpoch(state.watch._replace(**after or {}), epoch, motion, Reason.USED, [])
-    beliefs = SimpleNamespace(map_may_start=by_map, is_contested=lambda _: ahead)
+    beliefs = SimpleNamespace(
+        map_may_start=by_map,
+        is_contested=lambda _: ahead,
+        left_share=lambda _, watch: 0.01 if watch.rest is LATE else 0.0,
+    )
     return waits(beliefs, RADIO, state, usable)
 
 
@@ -51,6 +56,9 @@ def test_rows_without_a_number_measure_nothing():
     ("before", "after"),
     [
         (None, {"rest": DOUBTFUL}),
+        # One may have left unnoticed by now, or levels have shown the rest only now.
+        (REST, {"rest": LATE}),
+        (LATE, {"rest": REST}),
         (None, {"rode_unheard": True}),
         (None, {"rest": REST, "rode_unheard": True}),
         # Who goes on after a rest may have been carried.
@@ -80,13 +88,16 @@ def test_what_is_compared_with_beliefs_does_not_wait(measured):
         {"motion": Reason.MOTION_STUCK}, {"ahead": True}, {"by_map": True},
         {"state": replace(TRACKED, contested=True)}, {"state": replace(TRACKED, belief=None)},
         {"state": replace(TRACKED, status=Status.CONVERGED)},
-        {"state": replace(TRACKED, status=Status.UNCERTAIN)},
         # What was reported is of another belief: nobody has judged this one.
         {"state": TRACKED.with_output(Reported(belief(), Status.TRACKING, 0.0, None))},
     ],
 )  # fmt: skip
 def test_a_belief_in_doubt_does_not_wait(more):
     assert rule(**more) is None
+
+
+def test_what_is_not_certain_enough_waits_too():
+    assert rule(replace(TRACKED, status=Status.UNCERTAIN))(1e6)
 
 
 def test_a_belief_that_was_reported_waits():

@@ -10,7 +10,7 @@ from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.epochs import Epoch
 
 TOWN = Town.of(1)
-AREA = BayesFilter(heading_sd_deg=6.0).over_area(TOWN.area())
+AREA = BayesFilter(heading_sd_deg=6.0, claim_mass=0.95).over_area(TOWN.area())
 # Rows of the made town are 5 m long.
 WATCHED = replace(AREA, holds=replace(AREA.holds, longest_row_m=6.0))
 START_M = 500_450.0, 4_500_450.0

@@ -244,6 +244,23 @@ def test_a_layer_of_points(tmp_path):
         read_recording(path)
 
 
+def test_of_several_layers_of_points_the_one_with_times(tmp_path):
+    """Beside antennas on the same map it was refused, without a word on how to choose."""
+    points = [shapely.Point(24.94, lat) for lat in LAT_DEG]
+    walk = geopandas.GeoDataFrame({"Time": ISO, "rsrp": [-80.0] * 5}, geometry=points, crs=4326)
+    path = tmp_path / "drive.gpkg"
+    walk.to_file(path, layer="walk")
+    walk[["rsrp", "geometry"]].to_file(path, layer="antennas")
+    found = read_recording(path)
+    assert_placed(found, ["layers of points without times not read: antennas"])
+    walk.rename(columns={"Time": "Zeit"}).to_file(path, layer="other")
+    options = ReadOptions(columns={"time": "Zeit"})
+    assert_placed(read_recording(path, options=options), ["without the columns named not read"])
+    walk.to_file(path, layer="again")
+    with pytest.raises(InputError, match=r"walk, antennas, other, again.*--column time=COLUMN"):
+        read_recording(path)
+
+
 def test_other_json_is_no_recording(tmp_path):
     wide = json.dumps({f"{at}": {"lat": 60.0, "lon": 24.0, "time": at} for at in range(20_000)})
     plain = '{"version": 2, "crs": "EPSG:3067"}'

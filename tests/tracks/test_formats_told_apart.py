@@ -169,7 +169,7 @@ def test_separators_of_another_kind_are_named(tmp_path, made, own, other, told):
          "lat_deg=gps.lat and lon_deg=gps.lng and time=own_time"),
         (["time", "x:latitude", "y/long"], "lat_deg=x:latitude and lon_deg=y/long"),
         # Two of one field.
-        (["time", "lattitude", "latitud", "lon"], "lat_deg= one of lattitude, latitud"),
+        (["time", "lattitude", "latitdue", "lon"], "lat_deg= one of lattitude, latitdue"),
         # Nothing.
         (["time", "wert"], "lat_deg=LATITUDE and lon_deg=LONGITUDE"),
         (["wert", "zahl"], "lat_deg=LATITUDE and lon_deg=LONGITUDE and time=COLUMN"),

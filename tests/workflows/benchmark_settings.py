@@ -69,6 +69,7 @@ OF_BAYES = {
     "min_particles": (800, "options.min_particles"),
     "switch_mass": (0.9, "options.switch_mass"),
     "switch_hold_m": (11.0, "options.switch_hold_m"),
+    "claim_mass": (0.97, "rules.claimed_from"),
     "satellite_sd_m": (3.0, "satellites.zenith_m"),
     "antenna_height_m": (55.0, "satellites.height_m"),
     "antenna_height_sd_m": (33.0, "satellites.height_sd_m"),

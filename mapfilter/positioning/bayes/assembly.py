@@ -67,8 +67,7 @@ def assembled(options: BayesFilter, area: AreaFrame) -> BayesPositioner:
     threads = Threads(options.threads)
     motion, weights = _motion_errors(options, area), _map_weights(options)
     model = BayesModel(area, motion, weights, evidence=evidence, threads=threads)
-    particles, rules = _particle_options(options), AlternativeRules()
-    rules = replace(rules, claimed_from=min(rules.claimed_from, options.switch_mass))
+    particles, rules = _particle_options(options), AlternativeRules(claimed_from=options.claim_mass)
     positioned, carriageways = None, None
     if not area.cell_ids:
         positioned = particles, rules

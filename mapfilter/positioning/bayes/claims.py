@@ -41,6 +41,7 @@ def judged(
             enough = max(enough, options.switch_mass)
         by_fixes = beliefs.log_odds_of_fixes(state)
         probability = certainty(rules, belief, state.alternative, state.rivals, enough, by_fixes)
+        probability *= 1 - beliefs.left_share(state, state.watch)
         uncertain = probability < rules.claimed_from
         if recovery is not None and weighed:
             travelled_m = state.reckoning.travelled_m

@@ -94,6 +94,9 @@ class BayesFilter(Options):
         converged.
     switch_hold_m : float
         Distance travelled for which that must hold.
+    claim_mass : float
+        Least probability that a tracked position is right within 50 m with which it is claimed, as
+        TRACKING; with less it is UNCERTAIN.
     smooth : bool
         Whether positions are smoothed by the whole log (backward simulation).
     satellite_sd_m : float
@@ -132,6 +135,7 @@ class BayesFilter(Options):
     min_particles: Particles = 3000
     switch_mass: Probability = 0.995
     switch_hold_m: NotNegative = 20.0
+    claim_mass: Probability = 0.998
     smooth: bool = False
     satellite_sd_m: Positive = 2.0
     antenna_height_m: Annotated[float, Ge(-1e4), Le(1e4)] = 100.0

@@ -33,6 +33,7 @@ SURVEYED: Mapping[str, float] = {
     "level_weight": 0.5,
     "switch_mass": 0.95,
     "switch_hold_m": 60.0,
+    "claim_mass": 0.95,
 }
 """Defaults over surveyed levels, where they differ. Tracks of receivers are as wide as streets with
 their houses, so that a belief in one place is wide, too; it is asked for over a longer way."""

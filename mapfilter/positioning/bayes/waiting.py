@@ -14,9 +14,6 @@ from mapfilter.positioning.bayes.sources.usable import UsableEpoch
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
 
-_JUDGED_ANEW = (Status.CONVERGED, Status.UNCERTAIN)
-"""Statuses of one epoch, each of which is judged anew at the next."""
-
 
 def waits(
     beliefs: BeliefFilters, radio: RadioSource, state: BayesState, usable: UsableEpoch
@@ -49,8 +46,9 @@ def _may_wait(beliefs: BeliefFilters, state: BayesState, usable: UsableEpoch) ->
     if not isinstance(state.belief, ParticleBelief) or state.contested:
         return False
     known = state.reported
-    if state.status in _JUDGED_ANEW or (known is not None and known.belief is not state.belief):
-        # The status is not judged yet, or not of this belief.
+    judged = known is None or known.belief is state.belief
+    if state.status is Status.CONVERGED or not judged:
+        # The status is that of one epoch, or not of this belief.
         return False
     if usable.motion is not Reason.USED or _measures(usable.epoch):
         return False
@@ -59,7 +57,9 @@ def _may_wait(beliefs: BeliefFilters, state: BayesState, usable: UsableEpoch) ->
     before, after = state.watch, usable.watch
     in_doubt = after.rode_unheard or after.is_unheard(state.hold.step_unit_m)
     if after.rest is not None:
-        return not (in_doubt or after.rest.is_doubtful)
+        # How certain a rest is changes with its time and its levels.
+        told = beliefs.left_share(state, before) == 0 and beliefs.left_share(state, after) == 0
+        return told and not (in_doubt or after.rest.is_doubtful)
     return before.rest is None and not in_doubt
 
 

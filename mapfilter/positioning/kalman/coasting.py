@@ -4,15 +4,16 @@ A spoofer leads fixes away so slowly that each agrees with a belief that has fol
 before; a receiver that was jammed may come back beside the place. What contradicts them is where
 dead reckoning has led from before: each half minute the belief is kept as it is, and goes on
 without fixes (solution separation; Brown & McBurney 1988, and coasted inertial monitors,
-Tanıl et al. 2018). For the last place ``p`` of each of these, of a covariance P, and a fix z,
+Tanıl et al. 2018), but for their way (:mod:`mapfilter.positioning.kalman.coast`). For the speed u
+by which fixes would be led, known with a covariance U at first and V by now,
 
-    odds = o N(z - p; P + W) / N(z - p; P + R),
+    odds = o N(0; 0, U) / N(0; u, V);
 
-R of a right fix, W of a wrong one; o are prior odds, larger for a while after fixes had been
-missing. Steps may be wrong as well, with the prior odds of usual fixes; so both beliefs stay as
-likely as each other where all of them disagree.
+o are prior odds, larger for a while after fixes had been missing. Steps may be wrong as well, with
+the prior odds of usual fixes; so both beliefs stay as likely as each other where all of them
+disagree. Fixes that the belief rejects are back where they are at the place of one that is held.
 
-The same distances show by how much fixes understate what lasts of their errors
+Distances of younger ones show by how much fixes understate what lasts of their errors
 (:mod:`mapfilter.positioning.kalman.understated`).
 """
 
@@ -35,6 +36,8 @@ from mapfilter.positioning.sensors.pace import WALKERS_MPS
 _APART_S, _YOUNGEST_S, _OLDEST_S, _KEPT_S = 30.0, 55.0, 150.0, 600.0
 """Time between two beliefs that are kept, ages at which they are compared, and for how long one is
 kept that contradicts fixes: spoofing ends some time, and steps that were wrong are right again."""
+_HEARD_S = 15.0
+"""Time between two fixes whose way is used, as errors of those in a row are much the same."""
 _LED, _RETURNED, _RETURNS_S = 3e-3, 0.2, 90.0
 """Prior odds that fixes are wrong: usual ones, and ones that come back after a gap, which fade."""
 _WALKED_S, _DRIVEN_S, _LOOKED_S = 30.0, 300.0, 180.0
@@ -47,7 +50,8 @@ compared then; from the other on one that was held shows nothing."""
 _GAP_S, _LONGER = 20.0, 3.0
 """Time without a fix that is a gap, and how much longer than that between the last two it is."""
 _WRONG_M2, _MOST_NATS = 60.0**2 * np.eye(2), 50.0
-"""Covariance of wrong fixes, beside that of right ones, and the most that a fix says of both."""
+"""Covariance of wrong fixes, beside that of right ones, where a rejected one is looked at, and the
+most that fixes say of both."""
 _DOUBTED, _FAR_M = 0.2, 50.0
 """Probability of a belief without fixes, and its distance, from which on nothing is claimed."""
 _REGAINED, _KNOWN = 6.0, 4.0
@@ -93,6 +97,8 @@ class Coasting(EqualByValue):
         Whether it has contradicted them so much that it stays until they agree with it again.
     agrees_s : float
         Since when fixes have lain where steps lead; NaN where they do not.
+    is_met : bool
+        Whether a fix that was not used agrees with the belief that is held.
     """
 
     kept: tuple[Coast, ...] = ()
@@ -103,6 +109,7 @@ class Coasting(EqualByValue):
     apart: Separation = field(default_factory=Separation)
     is_held: bool = False
     agrees_s: float = nan
+    is_met: bool = False
 
     def begun_anew(self) -> Coasting:
         """Return it where the belief begins anew as steps were wrong.
@@ -113,7 +120,7 @@ class Coasting(EqualByValue):
 
     def broken_off(self) -> Coasting:
         """Return it where fixes and steps agree again."""
-        return replace(self, kept=(), apart=Separation(), is_held=False, agrees_s=nan)
+        return replace(self, kept=(), apart=Separation(), is_held=False, agrees_s=nan, is_met=False)
 
     def moved(self, motion: Motion, about: Floats) -> Coasting:
         """Return it after motion of dead reckoning, linear about a mean."""
@@ -147,36 +154,45 @@ class Coasting(EqualByValue):
         kept, returned_s = self.kept, self.returned_s
         if since_s > max(_GAP_S, _LONGER * self.usual_s):
             returned_s = time_s
-            kept = (*kept, Coast.of(time_s, predicted, self.times, place_m))
+            kept = (*kept, Coast.of(time_s, predicted, self.times, place_m, is_aside=True))
         kept = tuple(one for one in kept if time_s - one.begun_s <= _OLDEST_S)
         usual_s = since_s if since_s > 0 else self.usual_s
-        after = replace(self, kept=kept, returned_s=returned_s, usual_s=usual_s)
+        after = replace(self, returned_s=returned_s, usual_s=usual_s, is_met=False)
         held = self.apart.coast if self.is_held else None
         if held is not None:
             is_over = time_s - held.begun_s > _KEPT_S or held.heading_rad2 > _UNKNOWN_RAD2
             if is_over:
                 return after.broken_off()
-        most = Separation()
+        most, later = Separation(), []
         for one in (held,) if held is not None else kept:
-            is_return = one.begun_s == returned_s
-            if time_s - one.begun_s < _YOUNGEST_S and not is_return:
-                continue
-            if not (is_return or one is held) and one.heading_rad2 > _BENT_RAD2:
-                continue
-            prior = after._prior(one, time_s)
-            found = Separation(_probability(one, place_m, stated_m2, prior), one)
+            found = after._apart(one, (time_s, place_m, stated_m2), is_held=one is held)
+            later.append(found.coast or one)
             most = max(most, found, key=lambda one: one.probability)
+        after = replace(after, kept=kept if held is not None else tuple(later))
         is_held = self.is_held or most.probability >= _DOUBTED
         most = most if is_held or most.probability >= _LEAST else Separation()
         return replace(after, apart=most, is_held=is_held)
+
+    def _apart(self, one: Coast, fix: tuple[float, Floats, Floats], *, is_held: bool) -> Separation:
+        """Return a belief after a fix that was used, with its probability."""
+        time_s = fix[0]
+        is_return = one.begun_s == self.returned_s
+        is_young = time_s - one.begun_s < _YOUNGEST_S
+        if not (is_return or is_held) and (is_young or one.heading_rad2 > _BENT_RAD2):
+            return Separation()
+        after = one.heard(*fix)
+        probability = _probability(after.nats, self._prior(one, time_s))
+        is_next = time_s - one.heard_s >= _HEARD_S and not one.is_beyond(*fix)
+        return Separation(probability, after if is_next else one)
 
     def again(self, time_s: float, place_m: Floats, stated_m2: Floats) -> Coasting:
         """Return it at a fix that is not used: whether that agrees with what they contradicted."""
         if not self.is_held or self.apart.coast is None:
             return self
         prior = self._prior(self.apart.coast, time_s)
-        probability = _probability(self.apart.coast, place_m, stated_m2, prior)
-        return replace(self, apart=self.apart._replace(probability=probability))
+        off_m, right_m2 = self.apart.coast.off(place_m, stated_m2)
+        nats = _log_density(off_m, right_m2 + _WRONG_M2) - _log_density(off_m, right_m2)
+        return replace(self, is_met=_probability(nats, prior) < _AGREES)
 
     def _prior(self, one: Coast, time_s: float) -> float:
         """Return the odds that fixes are wrong by what a belief without them is older than."""
@@ -198,7 +214,8 @@ class Coasting(EqualByValue):
         belief : Gaussian
             With the fix, in the layout of dead reckoning.
         """
-        learnt = self.learnt.at_fix(time_s, seen_m, stated_m2, self.kept)
+        usual = (one for one in self.kept if not one.is_aside)
+        learnt = self.learnt.at_fix(time_s, seen_m, stated_m2, usual)
         after = replace(self, learnt=learnt, times=self.times if self.is_held else learnt.times)
         if self.kept and time_s - self.kept[-1].begun_s < _APART_S:
             return after
@@ -232,7 +249,7 @@ class Coasting(EqualByValue):
     @property
     def is_back(self) -> bool:
         """Whether fixes agree again with a belief without them that they had contradicted."""
-        return self.is_held and self.apart.probability < _AGREES
+        return self.is_held and (self.is_met or self.apart.probability < _AGREES)
 
     def is_known(self, place_m: Floats, stated_m2: Floats, other_m: Floats) -> bool:
         """Return whether that belief is at a fix, and so well known that another place is not."""
@@ -244,10 +261,8 @@ class Coasting(EqualByValue):
         return known and float(off_m @ np.linalg.solve(right_m2, off_m)) <= _REGAINED
 
 
-def _probability(one: Coast, place_m: Floats, stated_m2: Floats, prior: float) -> float:
+def _probability(nats: float, prior: float) -> float:
     """Return the probability that a belief without fixes is right, and they are not."""
-    off_m, right_m2 = one.off(place_m, stated_m2)
-    nats = _log_density(off_m, right_m2 + _WRONG_M2) - _log_density(off_m, right_m2)
     ratio = exp(min(nats, _MOST_NATS))
     # Steps that were wrong are as likely as usual fixes that are.
     return prior * ratio / (1 + (prior + _LED) * ratio)

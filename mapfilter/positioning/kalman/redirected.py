@@ -94,8 +94,8 @@ def regained_by(coasting: Coasting, layout: StateLayout, lasting_m: float | None
     # The place that fixes are of is the position and what lasts.
     parts = np.eye(size)[[*range(size), *([layout.east, layout.north] if of else [])]]
     transition[both] = 0.0
-    shift[both] = parts @ coast.mean
-    noise[np.ix_(both, both)] = parts @ coast.covariance @ parts.T
+    shift[both] = parts @ coast.mean[:size]
+    noise[np.ix_(both, both)] = parts @ coast.covariance[:size, :size] @ parts.T
     if lasting_m is not None:
         noise[of, of] += lasting_m**2
     return transition, noise, shift

@@ -52,6 +52,11 @@ _STROLL_SHARE = 0.5
 elsewhere: with all of it, the two could hardly be told apart after 30 m."""
 _LEFT_M = 45.0
 """Way from which on a position is in doubt."""
+_NEAR_M = 25.0
+"""Way up to which one that no step is counted of leaves a position within 50 m."""
+_DEAD_SHARE, _NATS_PER_FACTOR = 0.02, 6.0
+"""Assumed share of such rests that are none, as the counter has died; how much the sum has to fall
+for e times fewer simulated ways to reach it."""
 _SHOWABLE_NATS = -2.5
 """Sum of levels that do not change at all above which levels could not show a rest."""
 _RIDE_S = 60.0
@@ -204,6 +209,19 @@ class Rest(EqualByValue):
         far = self.pace_mps * (time_s - self.since_s) - measured_m >= _LEFT_M
         shown_nats = _SHOWN_AGAIN_NATS if self.is_doubtful else _SHOWN_NATS
         return far and still_nats <= _SHOWABLE_NATS and left_nats > shown_nats
+
+    def left_share(self, time_s: float) -> float:
+        """Return the probability that a walker has left the place unnoticed by a time.
+
+        0 while one cannot be far, where levels cannot show a rest, and once they show it as clearly
+        as those of a minute at rest do.
+        """
+        way_m = self.pace_mps * (time_s - self.since_s) - self.measured_m
+        told = self.is_certain or self.is_carried or self.pace_mps > WALKERS_MPS
+        if way_m < _NEAR_M or told or self.still_nats > _SHOWABLE_NATS:
+            return 0.0
+        odds = _DEAD_SHARE * exp(min(self.left_nats, 0.0) / _NATS_PER_FACTOR)
+        return odds / (1 - _DEAD_SHARE + odds)
 
     def carried(self, speed_mps: float = 0.0) -> Rest:
         """Return the rest as one that is none; positions may show its speed."""

@@ -16,6 +16,7 @@ from mapfilter.tracks.readers.plain.cells import add_cells
 from mapfilter.tracks.readers.plain.dates import with_dates
 from mapfilter.tracks.readers.plain.fields import FIELDS, usual_fields
 from mapfilter.tracks.readers.plain.fix_states import fix_column
+from mapfilter.tracks.readers.plain.foreign_names import FOREIGN, note_on_foreign
 from mapfilter.tracks.readers.plain.headers import stated_fields
 from mapfilter.tracks.readers.plain.mapped import (
     NAMED_CELLS,
@@ -115,6 +116,9 @@ def read_columns(rows: Columns, reading: Reading, options: ReadOptions) -> None:
         beside += (fix,)
     mapped = replace(mapped, beside=beside)
     _note_repeated(mapped, reading)
+    held = {field: rows.find(*mapped.names(field)) or "" for field in FOREIGN}
+    if note := note_on_foreign(held, mapped.own):
+        reading.note(note)
     reading.named = tuple(mapped.own)
     reading.tallies.columns |= {
         field: column for field in _VITAL if (column := rows.find(*mapped.names(field))) is not None

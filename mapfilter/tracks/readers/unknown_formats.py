@@ -61,7 +61,7 @@ NOT_READ = {
     ".blf": RAW_FRAMES,
     ".mf4": "a measurement of a bus; export its signals as CSV (asammdf)",
     ".mdf": "a measurement of a bus; export its signals as CSV (asammdf)",
-    ".vbo": "a VBOX file; export CSV, GPX or NMEA",
+    ".vbo": "a VBOX file without its date or positions; export CSV, GPX or NMEA",
     ".kml": "no KML that can be read; export GPX, or a table as CSV",
     ".kmz": "no KML that can be read; export GPX, or a table as CSV",
     ".geojson": "GeoJSON without points that have times; export GPX, or a table as CSV",

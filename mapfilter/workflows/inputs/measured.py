@@ -15,8 +15,9 @@ from mapfilter.radio.identities import IDENTITY
 from mapfilter.survey.measurement_rows import NotMeasurementsError, Rows
 from mapfilter.tracks.checks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_local_frame
 from mapfilter.tracks.log_folders import is_log
+from mapfilter.tracks.readers.contained.opening import OF_TABLES
 from mapfilter.tracks.readers.format import ReadOptions
-from mapfilter.tracks.readers.formats import format_of, read_recording
+from mapfilter.tracks.readers.formats import format_named, format_of, read_recording
 from mapfilter.tracks.schema import SERVING, TABLES
 from mapfilter.tracks.store import read_log
 
@@ -25,6 +26,7 @@ _CODE_REACH_M, _M_PER_DEG = 2000.0, 111_320.0
 """Beyond what is known of a cell its carrier and code may be another one's; of latitude."""
 _UNKNOWN = -1.0
 _PLAIN = "csv"
+_FRAMES = (".parquet", ".pq")
 _EXPECTED = "levels of cells, and positions"
 
 
@@ -42,16 +44,23 @@ def recorded_rows(path: Path) -> Rows | None:
     """
     if is_log(path):
         return _log_rows(path)
+    in_table = path.suffix.lower() in OF_TABLES
     known = format_of(path)
-    if known is None:
+    # Parquet is found to be a recording only when it is read.
+    if known is None and path.suffix.lower() not in _FRAMES:
         return None
-    recording = read_recording(path, options=ReadOptions())
+    try:
+        recording = read_recording(path, options=ReadOptions())
+    except InputError as error:
+        # JSON, workbooks and layers may be of anything.
+        raise (NotMeasurementsError(error.faults) if in_table else error) from error
+    known = known or format_named(recording.format)
     tables = recording.tables
     lacking = [name for name in ("radio", "positions") if name not in tables]
     if lacking:
         got = f"{known.title} of {', '.join(tables)}"
         # Columns of plain CSV have any names, so that levels may be in one that is not known.
-        if "radio" not in tables and known.name != _PLAIN:
+        if "radio" not in tables and (in_table or known.name != _PLAIN):
             raise fail(NotMeasurementsError, str(path), _EXPECTED, got)
         placed = {"true_places", "places"} & set(tables)
         hint = "convert it with --origin LAT,LON, and name the log" if placed else ""

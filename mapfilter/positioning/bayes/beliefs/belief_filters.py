@@ -272,9 +272,20 @@ class BeliefFilters:
     def may_have_left(self, state: BayesState) -> bool:
         """Return whether a walker may have left its position though no step is counted."""
         rest = state.watch.rest
-        if rest is None or not self.holds.watched or not rest.is_doubtful:
-            return False
-        return state.reckoning.travelled_m > gnss_of(state).used_at_m
+        return rest is not None and rest.is_doubtful and self._rests_unseen(state)
+
+    def left_share(self, state: BayesState, watch: SensorWatch) -> float:
+        """Return the probability that a walker has left its position though no step is counted.
+
+        ``watch`` is that of the epoch.
+        """
+        if watch.rest is None or not self._rests_unseen(state):
+            return 0.0
+        return watch.rest.left_share(watch.times.epoch_s)
+
+    def _rests_unseen(self, state: BayesState) -> bool:
+        """Return whether no position tells of a walker whether it rests."""
+        return self.holds.watched and state.reckoning.travelled_m > gnss_of(state).used_at_m
 
     def may_be_anywhere(self, state: BayesState, watch: SensorWatch, time_s: float) -> bool:
         """Return whether a walker rode before an epoch; ``watch`` is that of after it."""

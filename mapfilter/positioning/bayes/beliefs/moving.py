@@ -19,6 +19,7 @@ from mapfilter.positioning.bayes.rivals.alternative import MapBelief
 from mapfilter.positioning.bayes.rivals.held import as_measured, jumps
 from mapfilter.positioning.bayes.rivals.own_draws import OwnDraws
 from mapfilter.positioning.bayes.rivals.unaided import without_positions
+from mapfilter.positioning.bayes.rivals.uncounted import walked_on
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch, headed
 from mapfilter.positioning.sensors.rest import Rest
@@ -153,12 +154,24 @@ class _Move:
             self.beliefs = replace(self.beliefs, unaided=(*self.beliefs.unaided, alone))
 
     def carry_on(self, rested: Rest) -> None:
-        """Spread the belief over where one may have been carried during a rest that has ended."""
-        if self.beliefs.main is not None and self.filters.may_have_left(self.state):
-            self.finish_leg()
-            gone_s = self.epoch.time_s - rested.since_s
-            gone = carried_on(self.beliefs.main, rested, gone_s, self.own.carrying)
+        """Take a rest that has ended for a way where it may have been one.
+
+        If levels leave it in doubt, the belief is spread, else a rival goes on from there.
+        """
+        filters, state, time_s = self.filters, self.state, self.epoch.time_s
+        doubtful, share = filters.may_have_left(state), filters.left_share(state, state.watch)
+        if self.beliefs.main is None or not (doubtful or share > 0):
+            return
+        self.finish_leg()
+        main, own = self.beliefs.main, self.own.carrying
+        if doubtful:
+            gone = carried_on(main, rested, time_s - rested.since_s, own)
             self.beliefs = replace(self.beliefs, main=gone)
+        elif isinstance(main, ParticleBelief) and state.status is main.status is Status.TRACKING:
+            predict = filters.moving_filter(state, compass=self.compass).predict
+            known, gone_m = (main, state.null, state.hold), self.reckoning.travelled_m
+            rival = walked_on(filters.holds, *known, rested, time_s, share, gone_m, predict, own)
+            self.beliefs = replace(self.beliefs, held=(*self.beliefs.held, rival))
 
     def by_row(self, row: MotionStep) -> None:
         """Move everything by one row of motion."""

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import re
 from collections import Counter, deque
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from json import JSONDecoder
+from pathlib import Path
 from typing import Any
 
 from mapfilter._inputs import json_within
 from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
+from mapfilter.tracks.readers.contained.google_timeline import timeline_records
 from mapfilter.tracks.readers.contained.tables import (
     MOST_COLUMNS,
     MOST_VALUES,
     KeyPath,
+    PackedRecords,
     table_of_records,
     written,
 )
@@ -27,6 +30,11 @@ _LINE_BEGINS = re.compile(rb"[^{}\[\]\"\n]{1,80}\{\"")
 _LIST = re.compile(r"\"(\w{1,40})\"\s{0,20}:\s{0,20}\[\s{0,40}(?=\{)")
 _BLANK = re.compile(r"[\s,]*")
 _HEAD_BYTES, _LARGEST_BYTES = 1 << 12, 1 << 28
+_MOST_BYTES = 3 << 30
+_BYTES_OF = {b"{": 240, b"[": 72, b",": 160}
+"""What an object, a list and a further value take in memory, measured on a file of each."""
+_MOST_NAMES = 100_000
+"""Of one object: with more it is a table by its ids, or of settings."""
 _DEEPEST = 8
 _OF_KINDS: Mapping[str, tuple[str, ...]] = {"class": ("TPV",), "_type": ("location",)}
 """Names by which programs tell their kinds of records (gpsd, OwnTracks), and the kinds to read."""
@@ -55,27 +63,27 @@ def json_table(text: Text) -> Text | None:
     InputError
         The file is too large, nested too deep, or of another CRS than WGS 84.
     """
-    if len(text.data) > _LARGEST_BYTES:
-        got = f"{len(text.data) >> 20} MiB"
-        raise fail(InputError, str(text.path), "JSON of at most 256 MiB", got, "export CSV")
-    records, notes = _records(text.data.decode("utf-8", "replace"))
+    _check_size(text)
+    records, notes = _records(text.data.decode("utf-8", "replace"), text.path)
     records = [record for record in records if isinstance(record, dict)]
     if not records:
         return None
     _check_crs(text)
     records, left = _of_kind(records)
-    rows: list[dict[KeyPath, str]] = []
-    most, paths, aside = MOST_VALUES, dict[KeyPath, KeyPath](), Counter[str]()
+    rows, paths, aside = PackedRecords(), dict[KeyPath, KeyPath](), Counter[str]()
     records.reverse()
     while records:
         # Records and rows of a large file need not be in memory at the same time.
-        made = _rows(_with_place(records.pop()), text, most, aside)
-        most -= sum(map(len, made))
-        rows += ({paths.setdefault(at, at): value for at, value in row.items()} for row in made)
+        for row in _rows(_with_place(records.pop()), text, aside):
+            rows.add({paths.setdefault(at, at): value for at, value in row.items()})
+            if rows.values > MOST_VALUES:
+                hint = "export the positions and cells alone"
+                expected = "records of at most 5e7 values in all"
+                raise fail(InputError, str(text.path), expected, "more", hint)
     # An object of thousands of names holds objects by their ids, or is of settings.
-    if not any(rows) or (len(rows) == 1 and len(rows[0]) > MOST_COLUMNS):
+    if not rows.values or (len(rows) == 1 and len(rows.paths) > MOST_COLUMNS):
         return None
-    if {path[-1] for row in rows for path in row} >= _OF_ESTIMATES:
+    if {path[-1] for path in rows.paths} >= _OF_ESTIMATES:
         hint = "what a filter estimated; it is no recording, nor a ground truth"
         raise fail(InputError, str(text.path), "a recording", "an estimate of mapfilter", hint)
     notes += [f"{name}: {number_of(n, 'object')} left out, no cells" for name, n in aside.items()]
@@ -85,14 +93,36 @@ def json_table(text: Text) -> Text | None:
     return table_of_records(replace(text, notes=(*text.notes, *notes)), rows, "JSON")
 
 
-def _records(content: str) -> tuple[list[Any], list[str]]:
+def _check_size(text: Text) -> None:
+    """Refuse what would take too much memory: a value takes many times its letters.
+
+    Raises
+    ------
+    InputError
+    """
+    size = len(text.data)
+    if size > _LARGEST_BYTES:
+        got = f"{size >> 20} MiB"
+        raise fail(InputError, str(text.path), "JSON of at most 256 MiB", got, "export CSV")
+    taken = 2 * size + sum(text.data.count(mark) * one for mark, one in _BYTES_OF.items())
+    if taken > _MOST_BYTES:
+        values = text.data.count(b",") + text.data.count(b"{") + text.data.count(b"[")
+        expected = f"JSON whose values take up at most {_MOST_BYTES >> 30} GiB of memory"
+        got = f"about {values / 1e6:.0f} million values, which take {taken / 2**30:.1f} GiB"
+        hint = "export CSV, or the journey alone, or parts of it"
+        raise fail(InputError, str(text.path), expected, got, hint)
+
+
+def _records(content: str, path: Path) -> tuple[list[Any], list[str]]:
     """Return the objects of a text, and notes on what was left out."""
     # A table has the digits of numbers as they are.
     decoder = json_within()
     begin = content.lstrip()
     if begin.startswith("["):
         items, at = _items(begin, 1, decoder)
-        return items, [] if begin[at:].strip() == "]" else [_DAMAGED]
+        notes = [] if begin[at:].strip() == "]" else [_DAMAGED]
+        google, told = timeline_records(items)
+        return (google, [*notes, *told]) if google else (items, notes)
     objects, whole = _of_lines(begin, decoder)
     if not objects:
         # Objects over many lines each, the last of which may be cut off.
@@ -100,10 +130,19 @@ def _records(content: str) -> tuple[list[Any], list[str]]:
         objects, whole = [one for one in items if isinstance(one, dict)], at == len(begin)
     notes = [] if whole else [_DAMAGED]
     if len(objects) == 1:
+        google, told = timeline_records(objects[0])
+        if told and not google:
+            hint = "switch on the timeline of the phone, and export it, or take another logger"
+            got = "; ".join(told)
+            raise fail(InputError, str(path), "positions or Wi-Fi with times", got, hint)
+        if google:
+            return google, [*notes, *told]
         inner, left = _list_in(objects[0])
         return (inner, [*notes, *left]) if inner else (objects, notes)
     if not objects and (found := _LIST.search(begin)):
-        return _items(begin, found.end(), decoder)[0], [_DAMAGED]
+        items = _items(begin, found.end(), decoder)[0]
+        google, told = timeline_records({found[1]: items})
+        return google or items, [_DAMAGED, *(told if google else ())]
     return objects, notes
 
 
@@ -203,12 +242,11 @@ def _with_place(record: dict[str, Any]) -> dict[str, Any]:
 
 
 def _rows(
-    record: Mapping[str, Any], text: Text, most: int, aside: Counter[str], above: int = 0
-) -> list[dict[KeyPath, str]]:
-    """Return a record's values by their paths, once for each object of a list within it.
+    record: Mapping[str, Any], text: Text, aside: Counter[str], above: int = 0
+) -> Iterator[dict[KeyPath, str]]:
+    """Yield a record's values by their paths, once for each object of a list within it.
 
-    ``most`` values may be in them, ``above`` names led to the record, and ``aside`` counts objects
-    of lists that are of no cells.
+    ``above`` names led to the record, and ``aside`` counts objects of lists that are of no cells.
     """
     own: dict[KeyPath, str] = {}
     lists: list[tuple[KeyPath, list[Any]]] = []
@@ -222,22 +260,23 @@ def _rows(
         if isinstance(value, dict):
             todo += [((*path, str(name)), inner) for name, inner in value.items()]
         elif isinstance(value, list):
-            if value and _is_of_no_cells(path[-1]):
+            if value and any(map(_is_of_no_cells, path)):
                 aside[path[-1][:40]] += len(value)
             elif value and isinstance(value[0], dict):
                 lists.append((path, value))
         else:
             own[path] = written(value)
-    rows: list[dict[KeyPath, str]] = []
+        if len(own) > _MOST_NAMES:
+            hint = "export the positions and cells as a list of objects"
+            expected = f"objects of at most {_MOST_NAMES} names"
+            raise fail(InputError, str(text.path), expected, "more in one", hint)
+    several = False
     for path, items in lists:
         for item in items:
-            inner = (
-                _rows(item, text, most, aside, above + len(path)) if isinstance(item, dict) else []
-            )
-            rows += [{**own, **{(*path, *at): v for at, v in row.items()}} for row in inner]
-            most -= sum(map(len, rows[len(rows) - len(inner) :]))
-            if most < 0:
-                hint = "export the positions and cells alone"
-                expected = "records of at most 5e7 values in all"
-                raise fail(InputError, str(text.path), expected, "more", hint)
-    return rows or [own]
+            if not isinstance(item, dict):
+                continue
+            for row in _rows(item, text, aside, above + len(path)):
+                several = True
+                yield {**own, **{(*path, *at): value for at, value in row.items()}}
+    if not several:
+        yield own

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from mapfilter._inputs import open_input
 from mapfilter.tracks.readers.contained.android_cells import android_table, has_android_cells
+from mapfilter.tracks.readers.contained.fixed_lines import igc_table, is_igc, is_vbo, vbo_table
 from mapfilter.tracks.readers.contained.json_tables import is_json, json_table
 from mapfilter.tracks.readers.contained.modem_lines import is_modem_log, modem_table
 from mapfilter.tracks.readers.contained.wkt_points import with_point_columns
@@ -77,7 +78,7 @@ def read_any(
     if suffix in _LAYERS and _begins(path, _BEGINS_OF_LAYERS):
         from mapfilter.tracks.readers.contained.sheets_and_layers import layer_of
 
-        return layer_of(path, _PEEKED_ROWS if most_bytes >= 0 else -1)
+        return layer_of(path, _PEEKED_ROWS if most_bytes >= 0 else -1, own)
     # Of many in a folder, as parts of results, none is a journey unless it is named.
     if suffix in _FRAMES and most_bytes < 0 and _begins(path, _BEGINS_OF_FRAMES):
         from mapfilter.tracks.readers.contained.data_frames import frame_of
@@ -99,6 +100,9 @@ def _table_in(text: Text, is_known: Callable[[Text], bool], own: Collection[str]
         return gpx_table(text) or text
     if is_tcx(text):
         return tcx_table(text)
+    for is_such, table_of in ((is_igc, igc_table), (is_vbo, vbo_table)):
+        if is_such(text):
+            return table_of(text) or text
     if not is_known(text) and is_modem_log(text):
         return modem_table(text)
     return with_point_columns(text)

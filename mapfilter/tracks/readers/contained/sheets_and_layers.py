@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,11 @@ import shapely
 
 from mapfilter._ogr import sealed_gdal, vector_source
 from mapfilter._types import Floats
-from mapfilter.errors import InputError, fail
+from mapfilter.errors import InputError, fail, listed
 from mapfilter.radio.tables import read_table
 from mapfilter.tracks.readers.contained.tables import as_table, written
+from mapfilter.tracks.readers.plain.fields import usual_fields
+from mapfilter.tracks.readers.plain.headers import stated_fields
 from mapfilter.tracks.readers.texts.text import Text
 
 _DEGREES, _MOST_ROWS = "EPSG:4326", 5_000_000
@@ -35,16 +38,17 @@ def sheet_of(path: Path) -> Text:
     return as_table(Text(path, b"", notes), table.header, rows, "workbook")
 
 
-def layer_of(path: Path, most_rows: int = -1) -> Text:
+def layer_of(path: Path, most_rows: int = -1, own: Collection[str] = ()) -> Text:
     """Return the points of a GeoPackage's layer, with longitude and latitude, as a text of CSV.
 
-    ``most_rows`` are read at most, all of them where it is negative.
+    ``most_rows`` are read at most, all of them where it is negative. Of several layers of points it
+    is the only one with the columns ``own``, or else with times.
 
     Raises
     ------
     InputError
-        It cannot be read, has several layers of points, or none, or several points in a row, or a
-        CRS that is no part of the Earth.
+        It cannot be read, has several layers that may be meant, or none, or several points in a
+        row, or a CRS that is no part of the Earth.
     """
     source = vector_source(path)
     try:
@@ -56,13 +60,11 @@ def layer_of(path: Path, most_rows: int = -1) -> Text:
                 for name, kind in pyogrio.list_layers(source.path).tolist()
                 if kind is not None and "Point" in str(kind)
             ]
-            if len(layers) != 1:
-                got = ", ".join(layers)[:200] or "none"
-                hint = "export the one of the journey as CSV, GPX or a GeoPackage of its own"
-                raise fail(InputError, str(path), "one layer of points", got, hint)
+            held = {one: _columns(source.path, one) for one in layers}
+            layer, notes = _journey_of(path, held, own)
             # A layer may be a view without an end.
             few = most_rows if most_rows >= 0 else _MOST_ROWS + 1
-            frame: Any = pyogrio.read_dataframe(source.path, layer=layers[0], max_features=few)
+            frame: Any = pyogrio.read_dataframe(source.path, layer=layer, max_features=few)
     except (RuntimeError, OSError, ValueError) as error:
         got = str(error).partition(";")[0][:200].replace(f"'{path.absolute()}' ", "")
         raise fail(InputError, str(path), "a GeoPackage that can be read", got) from error
@@ -77,7 +79,46 @@ def layer_of(path: Path, most_rows: int = -1) -> Text:
         names += ["longitude", "latitude"]
         columns += [[_degrees(one) for one in axis] for axis in points]
     rows = zip(*columns, strict=True)
-    return as_table(Text(path, b""), names, (list(row) for row in rows), f"layer {layers[0]}")
+    return as_table(Text(path, b"", notes), names, (list(row) for row in rows), f"layer {layer}")
+
+
+def _columns(source: Path | str, layer: str) -> list[str]:
+    fields = pyogrio.read_info(source, layer=layer)["fields"]
+    return [str(name).lower() for name in fields]
+
+
+def _journey_of(
+    path: Path, layers: Mapping[str, Sequence[str]], own: Collection[str]
+) -> tuple[str, tuple[str, ...]]:
+    """Return the layer of points of a journey, and a note on the others.
+
+    Parameters
+    ----------
+    path : Path
+    layers : mapping of str to sequence of str
+        Columns of each layer of points.
+    own : collection of str
+        Columns that a user gives fields.
+    """
+    named = [one for one, names in layers.items() if {name.lower() for name in own} <= {*names}]
+    timed = [
+        one
+        for one, names in layers.items()
+        if "time" in {*usual_fields(names), *stated_fields(names, (), ())}
+    ]
+    for found, why in ((list(layers), ""), (named, "the columns named"), (timed, "times")):
+        if len(found) == 1:
+            left = [one for one in layers if one != found[0]]
+            note = f"layers of points without {why} not read: {listed(left)}"
+            return found[0], (note,) if left else ()
+    hint = (
+        "name a column that only the journey's has, such as --column time=COLUMN, or "
+        f"export it alone: ogr2ogr LAYER.gpkg {path.name} LAYER"
+    )
+    if not layers:
+        hint = "export the journey as points"
+    expected = "one layer of points, or one of them with times"
+    raise fail(InputError, str(path), expected, ", ".join(layers)[:200] or "none", hint)
 
 
 def _degrees_of(path: Path, frame: Any) -> tuple[Floats, Floats]:

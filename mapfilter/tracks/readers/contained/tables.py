@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import csv
 import io
+from array import array
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -21,6 +22,8 @@ MOST_LETTERS = 1 << 30
 MOST_COLUMNS = 1000
 """Of records, each of which may have names of its own."""
 A_TABLE = "a table of at most 5e7 values and 1 GiB of texts"
+_BETWEEN = "\x1f"
+"""What keeps the values of a record apart, which no text has."""
 SMALLER = "export the positions and cells alone, or parts of the journey"
 
 
@@ -71,15 +74,58 @@ def names_of(paths: Sequence[KeyPath]) -> dict[KeyPath, str]:
     return {path: path[-1] if count[path[-1].lower()] == 1 else ".".join(path) for path in paths}
 
 
-def table_of_records(text: Text, records: Sequence[Mapping[KeyPath, str]], what: str) -> Text:
+class PackedRecords:
+    """Records of values by their paths, in little more memory than their texts."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[KeyPath, ...], int] = {}
+        self._kinds: array[int] = array("L")
+        self._texts = io.BytesIO()
+        self.values = 0
+
+    def __len__(self) -> int:
+        return len(self._kinds)
+
+    def add(self, record: Mapping[KeyPath, str]) -> None:
+        """Keep a record; line breaks and separators within its texts become blanks."""
+        paths = tuple(record)
+        self._kinds.append(self._known.setdefault(paths, len(self._known)))
+        texts = (_on_a_line(value).replace(_BETWEEN, " ") for value in record.values())
+        self._texts.write(f"{_BETWEEN.join(texts)}\n".encode("utf-8", "replace"))
+        self.values += len(paths)
+
+    @property
+    def paths(self) -> list[KeyPath]:
+        """All paths, in the order in which they came."""
+        return list(dict.fromkeys(path for paths in self._known for path in paths))
+
+    def rows(self) -> Iterator[list[str]]:
+        """Yield the values of each record by :attr:`paths`, "" where it has none."""
+        place = {path: at for at, path in enumerate(self.paths)}
+        places = [[place[path] for path in paths] for paths in self._known]
+        self._texts.seek(0)
+        for kind, line in zip(self._kinds, self._texts, strict=True):
+            row = [""] * len(place)
+            for at, text in zip(places[kind], line[:-1].decode().split(_BETWEEN), strict=False):
+                row[at] = text
+            yield row
+
+
+def table_of_records(
+    text: Text, records: Sequence[Mapping[KeyPath, str]] | PackedRecords, what: str
+) -> Text:
     """Return records of values by their paths as a text of CSV; see :func:`as_table`."""
-    paths = list(dict.fromkeys(path for record in records for path in record))
+    if not isinstance(records, PackedRecords):
+        packed = PackedRecords()
+        for record in records:
+            packed.add(record)
+        records = packed
+    paths = records.paths
     if len(paths) > MOST_COLUMNS:
         expected, got = f"at most {MOST_COLUMNS} different names of values", f"{len(paths)}"
         raise fail(InputError, str(text.path), expected, got, SMALLER)
     names = names_of(paths)
-    rows = ([record.get(path, "") for path in paths] for record in records)
-    return as_table(text, [names[path] for path in paths], rows, what)
+    return as_table(text, [names[path] for path in paths], records.rows(), what)
 
 
 def written(value: Any) -> str:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from mapfilter._types import Floats
+from mapfilter.clocks.named_dates import dates_in_name
+from mapfilter.clocks.short_years import nearest
 from mapfilter.tracks.readers.plain.mapped import Mapped
 from mapfilter.tracks.readers.texts.columns import Columns
 
-_DATE = "date"
+_DATE, _DATE_OF_NAME = "date", "date in the name of the file"
 _A_DATE = re.compile(r"(\d{4}([-./])\d{1,2}\2\d{1,2}|\d{1,2}([-./])\d{1,2}\3\d{4})\.?")
 """With four digits of the year: others may be a version, such as 4.2.15."""
 _OF_DAY = re.compile(r"\d{1,2}:\d\d")
@@ -40,7 +43,8 @@ def with_dates(mapped: Mapped) -> Mapped:
     """Return columns with times of day after the dates of a column of their own, if there is one.
 
     That is the column ``date``, else the only one that is no field's and begins with a date. Both
-    may be digits without separators, such as 20260501 or 010526 and 101530.
+    may be digits without separators, such as 20260501 or 010526 and 101530. Without such a column
+    it is the date in the name of the file.
     """
     rows, name = mapped.rows, mapped.rows.find(*mapped.names("time"))
     if name is None or name == _DATE:
@@ -56,9 +60,26 @@ def with_dates(mapped: Mapped) -> Mapped:
     found = [one for one in others if _A_DATE.fullmatch(rows.first_text(one))]
     if rows.has(_DATE):
         found = [_DATE]
+    if not found:
+        return _of_the_name(mapped, name)
     if len(found) != 1:
         return mapped
     return _joined(mapped, rows, found[0], name)
+
+
+def _of_the_name(mapped: Mapped, name: str) -> Mapped:
+    """Return columns with times of day after the only date in the name of the file, if it has one.
+
+    The name is that of the file alone: a folder may hold logs of several days.
+    """
+    reading = mapped.rows.reading
+    days = {str(day) for day in dates_in_name(Path(reading.path.name))}
+    if len(days) != 1 or name in mapped.beside:
+        return mapped
+    day = days.pop()
+    reading.note(f"time: times of day without a date: those of {day}, by the name of the file")
+    rows = mapped.rows.with_column(_DATE_OF_NAME, day).joined(_DATE_OF_NAME, name)
+    return replace(mapped, rows=rows, beside=(_DATE_OF_NAME,), date=_DATE_OF_NAME)
 
 
 def _joined(mapped: Mapped, rows: Columns, date: str, name: str) -> Mapped:
@@ -81,7 +102,9 @@ def _of_digits(mapped: Mapped, name: str) -> Mapped:
         given = np.unique(rows.texts(date)[rows.with_digits(date)].astype(np.str_)).tolist()
         if not (given and all(map(_DIGITS.fullmatch, given)) and _are_of_day(rows.number(name))):
             return mapped
-        orders = _orders(given)
+        days = _orders(given)
+        near = nearest(days, lambda: rows.other_dates((date,))) if len(days) > 1 else ""
+        orders = [near] if near else _usual(days)
         if not orders:
             return mapped
         if len(orders) > 1:
@@ -91,7 +114,9 @@ def _of_digits(mapped: Mapped, name: str) -> Mapped:
             return mapped
         order = rows.reading.date_order = orders[0]
         if order != next(iter(_ORDERS)):
-            rows.reading.note(f"{date}: {order}")
+            others = [str(some[0]) for one, some in days.items() if one != order]
+            beside = f" ({given[0]}: {days[order][0]}, not {others[0]})" if others else ""
+            rows.reading.note(f"{date}: {order}{beside}")
     changed = rows.rewritten(r"^\s*(\d{1,6}(?:\.\d*)?)\s*$", r"00000\1", name)
     changed = changed.rewritten(r"^\d*(\d\d)(\d\d)(\d\d)(\.\d*)?$", r"\1:\2:\3\4", name)
     changed = changed.rewritten(r"^\s*(\d{5})\s*$", r"0\1", date)
@@ -104,9 +129,9 @@ def _are_of_day(number: Floats) -> bool:
     return bool(np.count_nonzero(of_day) >= _LEAST_OF_DAY * np.count_nonzero(known))
 
 
-def _orders(given: list[str]) -> list[str]:
-    """Return in which orders dates of digits may be written."""
-    found = []
+def _orders(given: list[str]) -> dict[str, list[np.datetime64]]:
+    """Return the days of dates of digits in each order in which they may be written."""
+    found: dict[str, list[np.datetime64]] = {}
     whole = all(len(one) == _WHOLE for one in given)
     for order in list(_ORDERS)[:1] if whole else list(_ORDERS)[1:]:
         pattern, by = _ORDERS[order]
@@ -115,9 +140,15 @@ def _orders(given: list[str]) -> list[str]:
             days = np.array(written, dtype="datetime64[D]")
         except ValueError:
             continue
-        if whole or (days.min() >= _FIRST_DAY and days.max() < _LAST_DAY):
-            found.append(order)
+        if whole or days.max() < _LAST_DAY:
+            found[order] = list(days)
     return found
+
+
+def _usual(days: dict[str, list[np.datetime64]]) -> list[str]:
+    """Return the orders of recent days; one with the whole year needs none."""
+    whole = next(iter(_ORDERS))
+    return [order for order, some in days.items() if order == whole or min(some) >= _FIRST_DAY]
 
 
 def seconds_in_digits(number: Floats) -> Floats:

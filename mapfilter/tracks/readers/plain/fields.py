@@ -8,6 +8,7 @@ from difflib import get_close_matches
 from itertools import permutations
 
 from mapfilter.errors import Faults
+from mapfilter.tracks.readers.plain.foreign_names import FOREIGN
 
 _UNIT_WORDS = {
     "_mps": "m/s",
@@ -28,7 +29,7 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
     "time": (
         *("time", "time_s", "timestamp", "datetime", "utc", "unix_time", "date_time", "t"),
         *("timestamps", "timestep_time", "time_utc_usec"),
-        *("ts", "time_stamp", "epoch", "unix_timestamp", "tst", "isotst"),
+        *("ts", "time_stamp", "epoch", "unix_timestamp", "tst", "isotst", "datetimeiso"),
         *("measured_at", "recorded_at", "tow", "tow_s", "gps_tow", "time_of_week"),
         "yyyy-mo-dd hh-mi-ss_sss",
     ),
@@ -97,7 +98,12 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
         f"{sensor}_{axis}": tuple(
             name
             for word in (sensor, *others)
-            for name in (f"{word}_{axis}", f"{word}{axis}", f"{word}_{axis}_{unit}")
+            for name in (
+                f"{word}_{axis}",
+                f"{word}{axis}",
+                f"{word}.{axis}",
+                f"{word}_{axis}_{unit}",
+            )
         )
         for sensor, unit, others in (
             ("acc", "mps2", ("accel", "accelerometer", "acceleration")),
@@ -108,7 +114,11 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
     },
 }
 FIELDS: Mapping[str, tuple[str, ...]] = {
-    field: tuple(dict.fromkeys([*names, *(name.replace("_", " ") for name in names)]))
+    field: tuple(
+        dict.fromkeys(
+            [*names, *(name.replace("_", " ") for name in names), *FOREIGN.get(field, ())]
+        )
+    )
     for field, names in _NAMES.items()
 }
 """Fields that a column map may name, and the names of columns that are known without one."""

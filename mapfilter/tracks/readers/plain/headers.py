@@ -8,10 +8,11 @@ from typing import TypeAlias
 
 from mapfilter._header_units import UNITS, parted_unit, quantity_of
 from mapfilter.tracks.readers.plain.fields import FIELDS, is_of_axis, usual_fields
+from mapfilter.tracks.readers.plain.foreign_names import BESIDE_PLACES, FOREIGN_QUANTITIES
 from mapfilter.tracks.readers.plain.misspelt import meant
 from mapfilter.tracks.readers.plain.served_names import served_name
 
-QUANTITIES: Mapping[str, tuple[str, ...]] = {
+_QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "time": (
         *("time", "timestamp", "date time", "local time", "unix time", "epoch time"),
         *("event time", "message time", "measurement time", "record time", "log time", "fix time"),
@@ -81,11 +82,14 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
         f"{sensor}_{axis}": tuple(f"{word} {axis}" for word in words)
         for sensor, words in (
             ("acc", ("acc", "accel", "accelerometer", "acceleration")),
-            ("gyr", ("gyr", "gyro", "gyroscope", "angular velocity")),
+            ("gyr", ("gyr", "gyro", "gyroscope", "angular velocity", "rate of rotation")),
             ("mag", ("mag", "magnetometer", "magnetic field")),
         )
         for axis in "xyz"
     },
+}
+QUANTITIES: Mapping[str, tuple[str, ...]] = {
+    field: (*words, *FOREIGN_QUANTITIES.get(field, ())) for field, words in _QUANTITIES.items()
 }
 """Words for the quantity of a field, in any order; times of the first of several columns."""
 
@@ -159,7 +163,7 @@ def stated_fields(
     found: dict[str, str] = {}
     ranks: dict[str, int] = {}
     for name in names:
-        if name in columns or names.count(name) > 1:
+        if name in columns:
             continue
         text, unit = parted_unit(name)
         for field, rank in _fields_of(text).items():
@@ -167,6 +171,10 @@ def stated_fields(
                 continue
             if rank < ranks.get(field, len(QUANTITIES[field])):
                 found[field], ranks[field] = name, rank
+    if not {"lat_deg", "lon_deg"} <= {*taken, *found}:
+        for field in ("speed_mps", "course_deg"):
+            if field in found and parted_unit(found[field])[0] in BESIDE_PLACES:
+                del found[field]
     return {field: found[field] for field in QUANTITIES if field in found}
 
 
@@ -203,7 +211,7 @@ def fields_meant(column: str) -> tuple[str, ...]:
     (('speed_mps', 'speed_kmh'), ('step_m', 'steps'), ('accuracy_m',), ())
     """
     text, unit = parted_unit(column)
-    if not unit and "[" in text:
+    if (not unit and "[" in text) or text in BESIDE_PLACES:
         return ()
     some = [
         one

@@ -17,6 +17,7 @@ from mapfilter.clocks.local_times import is_beside_change
 from mapfilter.clocks.times import parse_times, seconds_of_day
 from mapfilter.clocks.written_times import written_times
 from mapfilter.tracks.readers.clocks.local_parts import note_changes
+from mapfilter.tracks.readers.clocks.other_dates import other_dates
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.texts.numbers import DIGIT, read_numbers, read_whole_numbers
 
@@ -115,7 +116,8 @@ class Columns:
         if column is None:
             return parse_times(rows.texts(*names), zone, layout, after_s)
         later = partial(self._later, self.find(*names) or "")
-        found = written_times(column, zone, layout, after_s, reading.date_order, later)
+        others = partial(self.other_dates, names)
+        found = written_times(column, zone, layout, after_s, reading.date_order, later, others)
         reading.date_order = found.order or reading.date_order
         for note in found.notes:
             reading.note(note)
@@ -127,6 +129,12 @@ class Columns:
             column = rows._raw(*filter(None, (self.reading.date_column, name)))
             if column is not None:
                 yield column
+
+    def other_dates(self, own: Sequence[str]) -> list[np.datetime64]:
+        """Return dates of the file's name, and of other columns than these."""
+        taken = {*own, self.reading.date_column}
+        firsts = [self.first_text(name) for name in self.names]
+        return other_dates(self.reading.path, self.names, firsts, taken)
 
     def times_of_part(
         self, *names: str, zone: str = "", layout: str = "ISO8601"

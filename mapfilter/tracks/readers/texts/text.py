@@ -14,6 +14,7 @@ from mapfilter._cut_ends import without_zero_end
 from mapfilter._inputs import first_foreign_byte, open_input, wide_encoding
 from mapfilter._separator_line import without_separator_line
 from mapfilter.errors import InputError, fail
+from mapfilter.tracks.readers.plain.foreign_names import eastern_encoding
 from mapfilter.tracks.readers.texts.zipped import read_zipped, zip_of
 
 _HINTS = {
@@ -199,6 +200,9 @@ def _as_utf8(path: Path, data: bytes, notes: list[str]) -> bytes:
         try:
             data.decode("utf-8")
         except UnicodeDecodeError:
+            if eastern := eastern_encoding(data[:_HEAD_BYTES].split(b"\n", 1)[0]):
+                notes.append(f"no UTF-8; read as {eastern.upper()}")
+                return data.decode(eastern, "replace").encode()
             strange = data[:_HEAD_BYTES].decode("utf-8", "replace").count("\ufffd")
             if strange > _MOST_STRANGE_SHARE * min(len(data), _HEAD_BYTES):
                 got = "a binary file"
