@@ -123,7 +123,8 @@ def test_terms_of_another_source_are_added_and_its_state_is_kept():
         (Status.TRACKING, False, Status.TRACKING),
         # LOST by another way of holding the phone, or in doubt: the belief itself was not.
         (Status.LOST, True, Status.TRACKING),
-        (Status.UNCERTAIN, False, Status.TRACKING),
+        # Nobody judges it without a reading.
+        (Status.UNCERTAIN, False, Status.UNCERTAIN),
         (Status.LOST, False, Status.LOST),
         (Status.CONVERGED, False, Status.TRACKING),
     ],

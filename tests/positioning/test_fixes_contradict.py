@@ -148,7 +148,8 @@ def located(seed, askew_deg, moved_m=0.0):
         var_east_m2=25.0, var_north_m2=25.0, cov_east_north_m2=0.0,
     )  # fmt: skip
     given = make_log(CRS, motion=log.motion, radio=log.radio, gnss=fixes, truth=log.truth)
-    found = locate(given, BayesFilter().over_area(AREA), np.random.default_rng(5)).estimate
+    filter_ = BayesFilter(claim_mass=0.95).over_area(AREA)
+    found = locate(given, filter_, np.random.default_rng(5)).estimate
     error_m = np.hypot(
         found.east_m - log.truth["east_m"].to_numpy(),
         found.north_m - log.truth["north_m"].to_numpy(),

@@ -249,11 +249,17 @@ def test_a_course_that_waits_ends_before_headings_of_a_compass_begin():
     assert output.fix.north_m == pytest.approx(START_M[1] + 6.0, abs=1.0)
 
 
-@pytest.mark.parametrize("status", [Status.CONVERGED, Status.UNCERTAIN])
-def test_what_lasts_for_one_epoch_does_not_wait(status):
-    state, rng = begun(status=status)
+def test_what_lasts_for_one_epoch_does_not_wait():
+    state, rng = begun(status=Status.CONVERGED)
     ((after, _),) = walked(state, rng, STEP)
     assert (after.leg, after.belief is state.belief) == (NO_LEG, False)
+
+
+def test_what_is_uncertain_stays_so_while_it_waits():
+    state, rng = begun(status=Status.UNCERTAIN)
+    ((after, output),) = walked(state, rng, STEP)
+    assert (after.leg.rows, after.belief is state.belief) == (1, True)
+    assert (after.status, output.fix.status) == (Status.UNCERTAIN, Status.UNCERTAIN)
 
 
 def test_a_search_waits_too_and_loses_nothing_of_the_way():

@@ -104,7 +104,9 @@ def by_code(log):
 def test_walks_are_tracked_where_codes_are_used_again_far_away(each):
     """Most of eight walks, and none wrongly; without a counterpart of the namesakes it was none."""
     town, found = Town.of(3), []
-    few = BayesFilter(max_particles=5000, min_search_particles=3000, min_particles=800)
+    few = BayesFilter(
+        max_particles=5000, min_search_particles=3000, min_particles=800, claim_mass=0.95
+    )
     positioner = few.over_area(with_namesakes(town, each))
     for seed in range(21, 29):
         log = by_code(slowed(walk_log(town, seed, error_db=3.0)))

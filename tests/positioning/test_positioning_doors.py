@@ -58,7 +58,7 @@ def test_the_usual_options():
     assert replace(levels, **rest) == usual
     assert replace(model.evidence, levels=usual) == evidence
     particles = ParticleOptions(switch_mass=0.995, switch_hold_m=20.0)
-    assert (bound.options, bound.rules) == (particles, AlternativeRules())
+    assert (bound.options, bound.rules) == (particles, AlternativeRules(claimed_from=0.998))
     # The step of timing advance is rounded to decimetres in the options.
     assert (bound.satellites, bound.timing) == (GnssOptions(), TimingOptions(step_m=553.5))
     assert (bound.smooth, bound.grid) == (False, False)

@@ -315,7 +315,7 @@ def test_distrusted_positions_are_rejected_from_then_on():
 
 # In a made town: positions of 3 m at each step of 5 m, led away from the 80th on.
 TOWN = Town.of(1)
-FILTER = BayesFilter().over_area(TOWN.area())
+FILTER = BayesFilter(claim_mass=0.95).over_area(TOWN.area())
 TRUSTING = replace(FILTER, pulls=PullRules(watched=False))
 WALKS = range(3)
 LED_S = 80.0

@@ -38,7 +38,7 @@ def test_rides_are_noticed_and_most_walks_after_them_are_found():
     for seed in (1, 2, 3):
         town = Town.of(seed)
         log, from_s, to_s = ridden(slowed(walk_log(town, seed, 3400.0)), every_row=11)
-        positioner = BayesFilter().over_area(town.area())
+        positioner = BayesFilter(claim_mass=0.95).over_area(town.area())
         track = locate(log, positioner, np.random.default_rng(seed)).estimate
         place_m = [
             np.interp(track.time_s, log.truth["time_s"], log.truth[name])

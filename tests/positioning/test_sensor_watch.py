@@ -235,7 +235,7 @@ def test_a_log_that_begins_without_motion_is_left_alone():
 
 
 TOWN = Town.of(1)
-AREA = BayesFilter().over_area(TOWN.area())
+AREA = BayesFilter(claim_mass=0.95).over_area(TOWN.area())
 
 
 def faulty(log, fault):

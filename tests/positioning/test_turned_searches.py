@@ -20,8 +20,13 @@ from mapfilter.positioning.merging import epochs
 from mapfilter.tracks.log import make_log
 
 TOWN = Town.of(1)
-AREA = BayesFilter(heading_sd_deg=6.0).over_area(TOWN.area())
-FEW = {"max_particles": 5000, "min_search_particles": 3000, "min_particles": 800}
+AREA = BayesFilter(heading_sd_deg=6.0, claim_mass=0.95).over_area(TOWN.area())
+FEW = {
+    "claim_mass": 0.95,
+    "max_particles": 5000,
+    "min_search_particles": 3000,
+    "min_particles": 800,
+}
 
 
 def watching(positioner):

@@ -17,7 +17,9 @@ UNCERTAIN = Status.UNCERTAIN
 
 @pytest.fixture(scope="module")
 def positioner():
-    few = BayesFilter(max_particles=2000, min_search_particles=500, min_particles=200)
+    few = BayesFilter(
+        max_particles=2000, min_search_particles=500, min_particles=200, claim_mass=0.95
+    )
     return few.over_area(Town.of(1).area())
 
 
