@@ -1,13 +1,15 @@
 """Which database a merged one follows where several cover a place: exactly within their areas."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from small_world import CRS, LATTICE, make_plan
 
 from mapfilter.database.build import build
-from mapfilter.database.merge import merge
+from mapfilter.database.measured import Deviations, MeasuredParts
+from mapfilter.database.merge import _not_overridden, merge
 from mapfilter.errors import InputError, OutputError
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cells import CellPlan
@@ -134,3 +136,27 @@ def test_parameters_of_a_merged_database_are_those_of_its_parts(tmp_path):
     # A point belongs to A only where A is alone: beside B it is 4 dB weaker.
     assert set(merged.cell_points("A")[1].tolist()) == set(range(9))
     assert merged.cell_points("A", 4.0)[0].size == 14 * 17
+
+
+def test_deviations_are_kept_beside_later_databases_and_of_cells_that_these_lack():
+    """To the last pixel: of A within two areas, of which the second has no B."""
+    row, col = (axis.ravel().astype(np.int32) for axis in np.mgrid[: WHOLE.rows, : WHOLE.cols])
+    cell = np.repeat(np.arange(2, dtype=np.int32), row.size)
+    both = np.tile(row, 2), np.tile(col, 2)
+    found = Deviations(("A", "B"), cell, *both, np.arange(cell.size, dtype=np.float32))
+    later = [
+        SimpleNamespace(lattice=WHOLE.window(*window), plan=make_plan(cells))
+        for window, cells in (((3, 5, 6, 7), ("A", "B", "C")), ((0, 10, 14, 4), ("A",)))
+    ]
+    kept = _not_overridden(MeasuredParts(None, found), WHOLE, later).deviations
+    masks = {}
+    for number, name in enumerate(found.cell_ids):
+        masks[name] = np.zeros((WHOLE.rows, WHOLE.cols), dtype=bool)
+        own = kept.cell == number
+        masks[name][kept.row[own], kept.col[own]] = True
+    expected = np.ones((WHOLE.rows, WHOLE.cols), dtype=bool)
+    expected[3:9, 5:12] = False
+    np.testing.assert_array_equal(masks["B"], expected)
+    expected[:, 10:14] = False
+    np.testing.assert_array_equal(masks["A"], expected)
+    assert len(_not_overridden(MeasuredParts(None, found), WHOLE, []).deviations) == len(found)

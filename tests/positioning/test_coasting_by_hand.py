@@ -18,7 +18,8 @@ def coast(begun_s=0.0, variance_m2=(100.0, 25.0), cross_m2=0.0, place_m=(0.0, 0.
     covariance = np.diag([*variance_m2, 1e-2, 1e-3, 1e-6])
     covariance[0, 1] = covariance[1, 0] = cross_m2
     mean = np.array([*place_m, 0.0, 0.0, 0.0])
-    return Coast(begun_s, mean, covariance, np.zeros((2, 2)), times, mean[:2], np.zeros(2))
+    one = Coast.of(begun_s, Gaussian(mean, covariance), times, np.zeros(2))
+    return one._replace(place_m2=np.zeros((2, 2)))
 
 
 HELD = Coasting(kept=(coast(10.0),), apart=Separation(0.5, coast(10.0)), is_held=True)
@@ -29,9 +30,13 @@ def compared(state, time_s, place_m, since_s=1.0):
     return state.compared(time_s, np.array(place_m), STATED_M2, PREDICTED, since_s)
 
 
-def probability(off_m, right_m2, prior):
-    """Of wrong fixes against right ones and wrong steps, by normal densities."""
-    wrong_m2 = right_m2 + 3600.0 * np.eye(2)
+def probability(off_m, right_m2, prior, age_s=60.0, aside_m2=None):
+    """Of wrong fixes against right ones and wrong steps, by normal densities.
+
+    They may have been led by 1 m/s along each axis, and 0.01 m/s per root second.
+    """
+    aside_m2 = aside_m2 or age_s**2 * (1 + 1e-4 * age_s)
+    wrong_m2 = right_m2 + aside_m2 * np.eye(2)
     density = [
         exp(-0.5 * off_m @ np.linalg.inv(m2) @ off_m) / (2 * pi * np.linalg.det(m2) ** 0.5)
         for m2 in (wrong_m2, right_m2)
@@ -47,10 +52,10 @@ def test_both_axes_and_their_covariance_count():
     assert 0.01 < expected < 0.45
     assert compared(Coasting(kept=(one,)), 60.0, off_m).apart.probability == pytest.approx(expected)
     # It is the place of the belief that they are off.
-    moved = one._replace(mean=np.array([5.0, -6.0, 0, 0, 0]))
+    moved = one._replace(mean=np.array([5.0, -6.0, 0, 0, 0, 0, 0]))
     found = compared(Coasting(kept=(moved,)), 60.0, off_m + np.array([5.0, -6.0])).apart
     assert found.probability == pytest.approx(expected)
-    assert found.coast is moved
+    assert (found.coast.begun_s, found.coast.heard_s) == (moved.begun_s, 60.0)
 
 
 @pytest.mark.parametrize(
@@ -65,10 +70,10 @@ def test_at_which_age_a_belief_without_fixes_is_compared(age_s, is_compared):
 def test_of_several_beliefs_the_one_that_contradicts_most_counts():
     near, far = coast(0.0, place_m=(190.0, 0.0)), coast(1.0, place_m=(160.0, 0.0))
     for kept in ((near, far), (far, near)):
-        assert compared(Coasting(kept=kept), 60.0, [200.0, 0.0]).apart.coast is far
+        assert compared(Coasting(kept=kept), 60.0, [200.0, 0.0]).apart.coast.begun_s == far.begun_s
     # One that is held is the only one.
     held = replace(HELD, kept=(far,), apart=Separation(0.5, near))
-    assert compared(held, 60.0, [200.0, 0.0]).apart.coast is near
+    assert compared(held, 60.0, [200.0, 0.0]).apart.coast.begun_s == near.begun_s
 
 
 def test_what_is_hardly_probable_is_none():
@@ -115,15 +120,19 @@ def test_the_time_between_fixes_is_kept_where_two_come_at_once():
 def test_fixes_that_came_back_are_doubted_by_beliefs_of_before(begun_s, prior):
     """Those that began later have used such fixes themselves."""
     off_m = np.array([25.0, 0.0])
-    expected = probability(off_m, np.diag([109.0, 29.0]), prior)
+    expected = probability(off_m, np.diag([109.0, 29.0]), prior, 110.0 - begun_s)
     before = Coasting(kept=(coast(begun_s),), returned_s=20.0, usual_s=1.0)
     # The age of one that began as they came back does not matter.
     found = compared(before, 110.0, off_m)
     assert found.apart.probability == pytest.approx(expected if expected >= 0.01 else 0.0)
     held = replace(before, apart=Separation(0.5, coast(begun_s)), is_held=True)
+    # One that is not used may lie 60 m aside of the place; it changes no probability.
     again = held.again(110.0, off_m, STATED_M2)
-    assert again.apart.probability == pytest.approx(expected)
-    assert again.apart.coast is held.apart.coast
+    aside = probability(off_m, np.diag([109.0, 29.0]), prior, aside_m2=3600.0)
+    assert again.is_met == (aside < 0.05)
+    assert again.apart == held.apart
+    assert held.again(110.0, np.zeros(2), STATED_M2).is_met
+    assert not held.again(110.0, 9 * off_m, STATED_M2).is_met
     assert again.kept is held.kept
 
 

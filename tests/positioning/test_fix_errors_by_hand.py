@@ -6,6 +6,7 @@ from math import isnan, nan, sqrt
 import numpy as np
 import pytest
 
+from mapfilter.filters.gaussian import Gaussian
 from mapfilter.positioning.gnss.wander import FixWander, FoundErrors, WanderFix, Way
 from mapfilter.positioning.kalman.coast import Coast
 from mapfilter.positioning.kalman.coasting import Coasting, Separation
@@ -16,7 +17,7 @@ from mapfilter.positioning.kalman.models import KalmanOptions
 from mapfilter.positioning.kalman.proof import Doubt
 
 MOTION: Motion = np.eye(5), np.zeros((5, 5)), np.array([1.0, 2.0, 0, 0, 0])
-COAST = Coast(0.0, np.zeros(5), np.eye(5), np.eye(2), 1.0, np.zeros(2), np.zeros(2))
+COAST = Coast.of(0.0, Gaussian(np.zeros(5), np.eye(5)), 1.0, np.zeros(2))
 HELD = Coasting(kept=(COAST,), apart=Separation(0.5, COAST), is_held=True)
 LED = tuple(WanderFix(5.0 * k, 7.0 * k, 0.0, 0, 7.0 * k, 0.0, 3.0) for k in range(20))
 """Fixes that lie where steps have led."""
@@ -59,7 +60,7 @@ def test_the_way_since_the_last_fix():
 def test_beliefs_without_fixes_move_unless_steps_have_gaps():
     errors = FixErrors(coasting=Coasting(kept=(COAST,)))
     moved = errors.coasted(MOTION, np.zeros(5), 0)
-    assert moved.coasting.kept[0].mean.tolist() == [1, 2, 0, 0, 0]
+    assert moved.coasting.kept[0].mean.tolist() == [1, 2, 0, 0, 0, 0, 0]
     assert errors.coasted(MOTION, np.zeros(5), 1).coasting.kept == ()
     # One that is held stays where it was.
     held = FixErrors(coasting=HELD)

@@ -64,6 +64,9 @@ class Filters:
     def may_have_left(self, _):
         return self.left
 
+    def left_share(self, *_):
+        return 0.0
+
     def followed_ways(self, _):
         return self.course
 

@@ -95,6 +95,21 @@ def test_a_row_that_is_as_far_as_the_usual_speed_covers_the_pause():
         assert unrecorded_s(drive, RowTimes(), 110.0, going, 100.0, rested=False) == missing_s
 
 
+@pytest.mark.parametrize(
+    ("speed_mps", "after_s", "gone_m", "missing_s"),
+    [
+        # Of ten seconds a row covers five, and no more than five may lack; so it is at 0.8 m/s.
+        (5.0, 10.0, 25.0, 0.0), (5.0, 10.0, 24.9, 9.0), (0.8, 7.0, 1.6, 0.0), (0.8, 7.0, 1.5, 6.0),
+        # Who has stood so far covers nothing.
+        (0.0, 7.0, 1.5, 6.0),
+    ],
+)  # fmt: skip
+def test_what_a_row_covers_of_a_pause(speed_mps, after_s, gone_m, missing_s):
+    pace = Pace(100.0, 100.0, 100, 1.0, rests=True, speed_mps=speed_mps, fastest_mps=40.0)
+    going = Going(gone_m, True, True)
+    assert unrecorded_s(pace, RowTimes(), 100.0 + after_s, going, 100.0, rested=False) == missing_s
+
+
 def test_whoever_rests_before_and_after_a_pause_has_rested():
     rest = Going(0.0, True, False)
     assert unrecorded_s(ALWAYS, EVERY_2_S, 500.0, rest, 100.0, rested=True) == 0.0

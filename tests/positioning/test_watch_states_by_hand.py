@@ -86,3 +86,11 @@ def test_whoever_rests_before_and_after_a_pause_has_rested():
         _, found = told([*before, Epoch(after_s, STILL_ROW)])
         assert found[-1][1] is why
         assert {reason for _, reason, _ in found[:-1]} == {Reason.USED}
+
+
+@pytest.mark.parametrize(("nats", "certain"), [(-10.5, True), (-10.4, False), (0.0, False)])
+def test_levels_show_a_rest_for_certain(nats, certain):
+    rest = replace(STILL, left_nats=nats)
+    assert rest.is_certain is certain
+    # Not of one who is carried on.
+    assert not rest.carried().is_certain
