@@ -32,9 +32,28 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put modules with long tests first, so that no worker ends with one of them alone."""
+    """Put modules with long tests first, so that no worker ends with one of them alone.
+
+    The order is that of paths in all workers, whatever the order in which they collect.
+    """
     long = {item.path for item in items if item.get_closest_marker("long") is not None}
-    items.sort(key=lambda item: item.path not in long)
+    items.sort(key=lambda item: (item.path not in long, item.path))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(
+    collector: pytest.Collector,
+) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """Collect folders from their ends in every second worker.
+
+    In a fresh clone each module's assertions are rewritten first, and kept for the other worker:
+    so each rewrites half of them, not both all of them at the same time.
+    """
+    report = yield
+    worker = getattr(collector.config, "workerinput", {}).get("workerid", "gw0")
+    if isinstance(collector, pytest.Session | pytest.Directory) and worker[-1] in "13579":
+        report.result = list(reversed(report.result or []))
+    return report
 
 
 @pytest.hookimpl(wrapper=True)
