@@ -23,7 +23,7 @@ _OF_SEGMENTS = ("timelinePath", "visit", "activity", "timelineMemory")
 _OF_SIGNALS = ("position", "wifiScan", "activityRecord")
 _OF_OBJECTS = ("activitySegment", "placeVisit")
 _E7 = ("latitudeE7", "longitudeE7")
-_NO_CELLS = "Google's location history holds no cells, levels, steps or headings"
+_NO_CELLS = "Google's location history holds no cells, steps or headings"
 _INFERRED = "ends of segments, as Google inferred them"
 _MAC_BITS = 48
 
