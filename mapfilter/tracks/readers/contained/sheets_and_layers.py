@@ -83,8 +83,8 @@ def layer_of(path: Path, most_rows: int = -1, own: Collection[str] = ()) -> Text
 
 
 def _columns(source: Path | str, layer: str) -> list[str]:
-    fields = pyogrio.read_info(source, layer=layer)["fields"]
-    return [str(name).lower() for name in fields]
+    few: Any = pyogrio.read_dataframe(source, layer=layer, max_features=1, read_geometry=False)
+    return [str(name).lower() for name in few.columns]
 
 
 def _journey_of(
