@@ -8,6 +8,7 @@ import pytest
 
 from mapfilter.clocks.written_times import written_times
 from mapfilter.tracks.readers.contained.fixed_lines import vbo_table
+from mapfilter.tracks.readers.contained.google_timeline import timeline_records
 from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.readers.texts.text import Text
 
@@ -39,3 +40,20 @@ def test_vbo_whose_comment_has_letters_that_are_longer_in_lower_case() -> None:
     found = vbo_table(Text(Path("a.vbo"), text.encode()))
     assert found is not None
     assert b"60.100000000" in found.data
+
+
+def test_vbo_whose_times_are_beyond_the_last_year() -> None:
+    text = (
+        "File created on 31/12/9999 at 10:15\n[column names]\ntime lat long\n"
+        "[data]\n250000 +3606.0 -01494.0\n"
+    )
+    found = vbo_table(Text(Path("a.vbo"), text.encode()))
+    assert found is not None
+    assert b"60.100000000" in found.data
+
+
+def test_address_of_thousands_of_digits_is_left_out() -> None:
+    scan = {"deliveryTime": "2026-05-01T10:00:00Z", "devicesRecords": [{"mac": "0" * 5000}]}
+    records, notes = timeline_records({"rawSignals": [{"wifiScan": scan}]})
+    assert not records
+    assert notes[0] == "1 access point without an address left out"

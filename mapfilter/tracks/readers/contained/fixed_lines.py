@@ -153,4 +153,7 @@ class _Clock:
         elif self._last - of_day > timedelta(hours=12):
             self._day += timedelta(days=1)
         self._last = of_day
-        return (start + self._day + of_day).isoformat()
+        try:
+            return (start + self._day + of_day).isoformat()
+        except OverflowError:
+            return ""
