@@ -6,7 +6,11 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-_FRACTION = r"^(?P<before>.*\d:\d\d:\d\d)\s(?P<digits>\d{1,3})(?P<after>\D.*)?$"
+_FRACTION = (
+    r"^(?P<before>.*\d:\d\d:\d\d)\s(?P<digits>\d{1,3})"
+    r"(?P<after>\s?(?:Z|[AaPp]\.?[Mm]\.?|[+-]\d\d(?::?\d\d)?|[A-Z]{3,5})|\s+\d{1,4}[-/.].*)?$"
+)
+"""Before the end, a zone or a date; digits before a point or a hyphen are of a date themselves."""
 _WIDTH = 3
 
 

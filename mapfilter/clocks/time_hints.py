@@ -9,8 +9,10 @@ from mapfilter.clocks.named_zones import named_zone_hint
 from mapfilter.clocks.short_years import short_readings
 
 
-def hint_on_time(text: str) -> str:
+def hint_on_time(text: str, dated_by_name: bool = True) -> str:
     """Return the likely mistake behind a text that is no time; "" where none is known.
+
+    ``dated_by_name`` tells whether times of day take the date in the name of their file.
 
     Examples
     --------
@@ -34,7 +36,8 @@ def hint_on_time(text: str) -> str:
         return "a month that is not named in English; write 2026-05-01T10:00:00"
     if re.match(r"\d{1,2}:\d\d", text.strip()):
         asked = "a time of day without its date; write 2026-05-01T08:00:00, or seconds"
-        return f"{asked}, or put the date into the name of the file, as 2026-05-01.csv"
+        by_name = ", or put the date into the name of the file, as 2026-05-01.csv"
+        return f"{asked}{by_name}" if dated_by_name else asked
     if re.search(r"\d\s?[ap]\.?m\.?$", text.strip(), re.IGNORECASE):
         return "AM and PM go with hours of 1 to 12; write 2026-05-01T14:00:00"
     return ""

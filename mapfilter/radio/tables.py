@@ -156,17 +156,22 @@ def read_table(path: Path, what: str) -> Table:
 
 def _unpacked(path: Path, data: bytes, what: str) -> bytes:
     """Return what is packed with gzip, as public lists of cells are."""
-    unpacker = zlib.decompressobj(wbits=31)
-    try:
-        found = unpacker.decompress(data, _LARGEST_UNPACKED_BYTES)
-    except zlib.error as error:
-        raise fail(InputError, str(path), "a gzip file", str(error), "damaged") from error
-    if unpacker.unconsumed_tail:
-        mib = _LARGEST_UNPACKED_BYTES >> 20
-        raise fail(InputError, str(path), f"{what} of at most {mib} MiB unpacked", "a larger one")
-    if not unpacker.eof:
-        raise fail(InputError, str(path), "a whole gzip file", "a part of one", "cut off")
-    return found
+    found = bytearray()
+    # Lists that were joined, or packed in blocks, are several files one after another.
+    while data.startswith(_GZIP):
+        unpacker = zlib.decompressobj(wbits=31)
+        try:
+            found += unpacker.decompress(data, _LARGEST_UNPACKED_BYTES - len(found) + 1)
+        except zlib.error as error:
+            raise fail(InputError, str(path), "a gzip file", str(error), "damaged") from error
+        if len(found) > _LARGEST_UNPACKED_BYTES:
+            mib = _LARGEST_UNPACKED_BYTES >> 20
+            expected = f"{what} of at most {mib} MiB unpacked"
+            raise fail(InputError, str(path), expected, "a larger one")
+        if not unpacker.eof:
+            raise fail(InputError, str(path), "a whole gzip file", "a part of one", "cut off")
+        data = unpacker.unused_data
+    return bytes(found)
 
 
 def _separator(heads: Sequence[str]) -> str:

@@ -53,6 +53,8 @@ _OTHER_FORMATS: Mapping[tuple[str, ...], str] = {
     "prediction.survey.files",
 }
 """By suffix what else lies in folders of exports, and how it becomes a raster."""
+_GRIDS = (".grd", ".img", ".vrt")
+"""Other rasters that GDAL reads as they are."""
 _MOST_FILES = 100_000
 _FEW_FILES = 3
 """Files with the same fault are reported one by one; of more the first ones are named."""
@@ -196,6 +198,9 @@ def _listed(folder: Path) -> list[Path]:
 def _how_to_convert(names: Sequence[str]) -> str:
     """Return how files of other formats become rasters that are read; "" without any."""
     by_suffix = {Path(name).suffix.lower(): name for name in reversed(names)}
+    # Headers and texts lie beside grids, which alone are converted.
+    if grid := next((by_suffix[one] for one in _GRIDS if one in by_suffix), ""):
+        names, by_suffix = [grid], {}
     for suffixes, hint in _OTHER_FORMATS.items():
         if found := next((by_suffix[one] for one in suffixes if one in by_suffix), ""):
             return f"{found}: {hint}"

@@ -189,7 +189,7 @@ class Rows:
             text = self.waiting.text(first)
             self.aside[NO_TIME] += odd.size
             self.odd_time = f"{text[:40]!r} in line {self.waiting.lines[first]}"
-            hint = hint_on_time(text)
+            hint = hint_on_time(text, dated_by_name=False)
             self.odd_time += f" ({hint})" if hint else ""
 
     def notes(self) -> list[str]:

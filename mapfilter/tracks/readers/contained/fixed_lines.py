@@ -9,6 +9,7 @@ Racelogic, "VBO file format": latitudes and longitudes in minutes, longitudes po
 from __future__ import annotations
 
 import re
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime, timedelta
 
@@ -41,15 +42,16 @@ def is_igc(text: Text) -> bool:
 def igc_table(text: Text) -> Text | None:
     """Return the fixes of IGC as a text of CSV; None where there is none."""
     content = text.data.decode("utf-8", "replace")
-    dates = [(one.start(), one.groups()) for one in _IGC_DATE.finditer(content)]
+    dates = [one.groups() for one in _IGC_DATE.finditer(content)]
+    starts = [one.start() for one in _IGC_DATE.finditer(content)]
     rows, by_pressure, without = list[list[str]](), list[str](), 0
     clock = _Clock()
     for fix in _IGC_FIX.finditer(content):
         time, lat, lat_m, ns, lon, lon_m, ew, valid, pressure_m, gnss_m = fix.groups()
-        given = [parts for at, parts in dates if at < fix.start()]
-        if not given:
+        before = bisect_left(starts, fix.start())
+        if not before:
             continue
-        day, month, year = map(int, given[-1])
+        day, month, year = map(int, dates[before - 1])
         century = 1900 if year >= _LATEST_YEAR else 2000
         stamp = clock.stamp((century + year, month, day), time)
         if valid != "A":
@@ -118,10 +120,11 @@ def _degrees(minutes: str, sign: int) -> str:
 
 def _section(content: str, title: str) -> list[str]:
     """Return the lines of a section that are not blank."""
-    at = content.lower().find(title)
-    if at < 0:
+    # Lower case may have more letters, so that places in it are others.
+    found = re.search(re.escape(title), content, re.IGNORECASE | re.ASCII)
+    if found is None:
         return []
-    body = content[at + len(title) :]
+    body = content[found.end() :]
     end = body.find("\n[")
     return [line for line in body[: end if end >= 0 else None].splitlines() if line.strip()]
 
@@ -150,4 +153,7 @@ class _Clock:
         elif self._last - of_day > timedelta(hours=12):
             self._day += timedelta(days=1)
         self._last = of_day
-        return (start + self._day + of_day).isoformat()
+        try:
+            return (start + self._day + of_day).isoformat()
+        except OverflowError:
+            return ""

@@ -25,7 +25,7 @@ _OF_OBJECTS = ("activitySegment", "placeVisit")
 _E7 = ("latitudeE7", "longitudeE7")
 _NO_CELLS = "Google's location history holds no cells, steps or headings"
 _INFERRED = "ends of segments, as Google inferred them"
-_MAC_BITS = 48
+_MAC_BITS, _MAC_DIGITS = 48, 18
 
 Record = dict[str, Any]
 
@@ -155,7 +155,7 @@ def _of_scan(time: object, scan: Mapping[str, Any], left: Counter[str]) -> Itera
     points = _objects(scan.get("devicesRecords")) or _objects(scan.get("accessPoints"))
     for one in points:
         mac = str(one.get("mac", ""))
-        if not mac.isdecimal() or int(mac[:18]).bit_length() > _MAC_BITS:
+        if not mac.isdecimal() or len(mac) > _MAC_DIGITS or int(mac).bit_length() > _MAC_BITS:
             left["access point without an address"] += 1
             continue
         address = f"{int(mac):012x}"

@@ -18,6 +18,8 @@ _DATE, _DATE_OF_NAME = "date", "date in the name of the file"
 _A_DATE = re.compile(r"(\d{4}([-./])\d{1,2}\2\d{1,2}|\d{1,2}([-./])\d{1,2}\3\d{4})\.?")
 """With four digits of the year: others may be a version, such as 4.2.15."""
 _OF_DAY = re.compile(r"\d{1,2}:\d\d")
+_DATE_BEHIND = re.compile(r"\s\d{1,4}(?:[-/.][^\W_]{1,9}[-/.]|[ ][A-Za-z]{3,9}\.?[ ])\d")
+"""A date after the time of day, such as 10:15:30 1.5.2026."""
 _DIGITS_OF_DAY = re.compile(r"\d{5,6}(\.\d*)?")
 """Hours, minutes and seconds without separators, such as 101530; a spreadsheet drops a 0 before."""
 _FEW_DIGITS_OF_DAY = re.compile(r"\d{1,6}(\.\d*)?")
@@ -60,7 +62,7 @@ def with_dates(mapped: Mapped) -> Mapped:
     found = [one for one in others if _A_DATE.fullmatch(rows.first_text(one))]
     if rows.has(_DATE):
         found = [_DATE]
-    if not found:
+    if not found and not _DATE_BEHIND.search(rows.first_text(name)):
         return _of_the_name(mapped, name)
     if len(found) != 1:
         return mapped

@@ -1,7 +1,7 @@
-"""Names of columns in German, French, Spanish, Chinese and Japanese that programs write.
+"""Names of columns in German, French, Spanish, Chinese and Japanese.
 
-Each is in the source of at least one program that writes logs of positions, and has one meaning in
-them. Words with several are left out: a person names their columns.
+Most are those that programs write into logs of positions, others the usual words; each has one
+meaning in such logs. Words with several are left out: a person names their columns.
 """
 
 from __future__ import annotations
