@@ -80,6 +80,9 @@ class Beliefs:
     def may_have_left(self, state):
         return self.left
 
+    def left_share(self, state, watch):
+        return 0.0
+
     def followed_ways(self, state):
         return False
 
