@@ -39,7 +39,7 @@ def not_watching(positioner):
 
 
 SMALL = BayesFilter(heading_sd_deg=6.0, **FEW).over_area(AREA.area)
-SEEDS = range(1, 6)
+SEEDS = range(1, 9)
 
 
 def turned_log(seed, by_rad, turned_s=20.0):
