@@ -44,7 +44,9 @@ def doubted(
     if state.contested and beliefs.is_pulled(state):
         return positions_in_doubt(epoch, unused)
     if moves and (taken_over or (epoch.motion and state.contested)):
-        return [_motion(epoch, Reason.PHONE_TURNED)]
+        # The likeliest rival comes first; one that reads headings alike has walked uncounted.
+        uncounted = not taken_over and any(one.hold == state.hold for one in state.held[:1])
+        return [_motion(epoch, Reason.MOTION_STUCK if uncounted else Reason.PHONE_TURNED)]
     return [_motion(epoch, Reason.OTHER_UNIT)] if other_unit else []
 
 

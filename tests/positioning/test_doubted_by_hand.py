@@ -1,0 +1,25 @@
+"""Which sensor is told to be in doubt where a rival is ahead of the belief."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from mapfilter.filters.contract import MotionStep, Reason
+from mapfilter.positioning.bayes.doubted import doubted
+from mapfilter.positioning.bayes.rivals.hold import Hold
+from mapfilter.positioning.epochs import Epoch
+
+TURNED, EPOCH = Hold(1.0, 3.0), Epoch(1.0, (MotionStep(1.4, 0.3),))
+BELIEFS = SimpleNamespace(may_have_left=lambda _: False, is_pulled=lambda _: False)
+
+
+@pytest.mark.parametrize("main", [Hold(), Hold(-1.0, 0.5, 0.3)])
+@pytest.mark.parametrize(
+    ("uncounted_leads", "why"), [(True, Reason.MOTION_STUCK), (False, Reason.PHONE_TURNED)]
+)
+def test_the_likeliest_rival_tells_whether_the_counter_or_the_phone(main, uncounted_leads, why):
+    holds = (main, TURNED) if uncounted_leads else (TURNED, main)
+    held = tuple(SimpleNamespace(hold=one) for one in holds)
+    state = SimpleNamespace(hold=main, contested=True, held=held)
+    (found,) = doubted(BELIEFS, state, main, EPOCH, [], moves=True)
+    assert (found.kind, found.reason) == ("motion", why)
