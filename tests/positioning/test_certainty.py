@@ -1,17 +1,21 @@
 """How certain a position is, with all that competes with it, against sums by hand."""
 
-from math import exp, log
+from dataclasses import replace
+from math import exp, inf, log
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from mapfilter.filters.contract import Status
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.certainty import Recovery, _share_near, certainty
+from mapfilter.positioning.bayes.claims import judged
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, AlternativeRules
 from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
 from mapfilter.positioning.bayes.rivals.hold import Hold
+from mapfilter.positioning.bayes.state import BayesState
 
 RULES = AlternativeRules()
 BINS = Bins.over((0.0, 0.0, 2000.0, 2000.0))
@@ -136,3 +140,24 @@ def test_masses_on_a_grid_are_not_compared_with_turned_phones():
     """Their beliefs are of hypotheses, and a grid has none beside it."""
     grid = SimpleNamespace(summary=SimpleNamespace(mass_50m=0.9))
     assert certainty(RULES, grid, rivals=[turned(2.0, 700.0)]) == 0.9
+
+
+@pytest.mark.parametrize(
+    ("left_share", "status"),
+    [(0.0, Status.TRACKING), (0.02, Status.TRACKING), (0.051, Status.UNCERTAIN)],
+)
+def test_a_rest_in_doubt_counts_beside_rivals_where_they_lie(left_share, status):
+    """Odds of 0.05 leave 0.952 wherever the rival is, but it is in the very place."""
+    main = replace(belief(500.0), status=Status.TRACKING)
+    beliefs = SimpleNamespace(
+        options=SimpleNamespace(split_mass=0.5),
+        rules_of=lambda _: AlternativeRules(claimed_from=0.95),
+        options_of=lambda _: SimpleNamespace(switch_mass=0.95, switch_hold_m=20.0),
+        may_have_left=lambda _: False,
+        is_unheard=lambda _: False,
+        is_contested=lambda _: False,
+        log_odds_of_fixes=lambda _: -inf,
+        left_share=lambda *_: left_share,
+    )
+    state = BayesState(belief=main, status=Status.TRACKING, held=(turned(log(0.05), 500.0),))
+    assert judged(beliefs, state, weighed=True, positioned=False).status is status

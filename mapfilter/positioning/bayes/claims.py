@@ -40,8 +40,10 @@ def judged(
         if recovery is not None:
             enough = max(enough, options.switch_mass)
         by_fixes = beliefs.log_odds_of_fixes(state)
-        probability = certainty(rules, belief, state.alternative, state.rivals, enough, by_fixes)
-        probability *= 1 - beliefs.left_share(state, state.watch)
+        here = 1 - beliefs.left_share(state, state.watch)
+        # What is enough has to be so with the probability of still being there.
+        known = state.alternative, state.rivals, enough / here, by_fixes
+        probability = here * certainty(rules, belief, *known)
         uncertain = probability < rules.claimed_from
         if recovery is not None and weighed:
             travelled_m = state.reckoning.travelled_m
