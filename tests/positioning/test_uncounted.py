@@ -12,6 +12,7 @@ from mapfilter.positioning.bayes.rivals.alternative import NullHypothesis
 from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
 from mapfilter.positioning.bayes.rivals.uncounted import walked_on
+from mapfilter.positioning.bayes.sources.evidence import RadioReading
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.sensors.rest import Rest
 
@@ -44,7 +45,8 @@ def test_it_goes_on_from_where_the_pace_before_may_have_led():
 
     def predict(belief, step, _):
         calls.append(step)
-        return replace(belief, log_weight=belief.log_weight - 3.0, travelled_m=77.0), None
+        gone_m = belief.travelled_m + 77.0
+        return replace(belief, log_weight=belief.log_weight - 3.0, travelled_m=gone_m), None
 
     rules = HoldRules(particles=200)
     found = walked_on(rules, state.belief, NULL, TURNED, REST, 50.0, 0.02, 123.0, predict, rng)
@@ -55,9 +57,13 @@ def test_it_goes_on_from_where_the_pace_before_may_have_led():
     mean_square_m2 = 2 * 1.25**2 * 60 * (40 - 60 * (1 - exp(-40 / 60)))
     assert step.spread_m == pytest.approx(mean_square_m2**0.5)
     assert found.log_prior == pytest.approx(log(0.02 / 0.98))
-    assert (found.null, found.hold, found.start_m) == (NULL, TURNED, 123.0)
-    assert (found.belief.travelled_m, found.belief.log_weight.size) == (77.0, 200)
-    # The way costs it nothing.
+    assert (found.hold, found.start_m) == (TURNED, 123.0)
+    way_m = state.belief.travelled_m + 77.0
+    assert (found.belief.travelled_m, found.belief.log_weight.size) == (way_m, 200)
+    # The way costs it nothing, and the null hypothesis neither.
+    assert found.null == NullHypothesis(-9.0, 77.0)
+    still = found.null.after(RadioReading(), 0.0, 0.0, 77.0)
+    assert still.log_odds == NULL.after(RadioReading(), 0.0, 0.0, 0.0).log_odds
     assert np.exp(found.belief.log_weight).sum() == pytest.approx(1.0)
     assert found.log_bayes_factor(state.belief) == 0.0
     assert not found.tells_half_turn

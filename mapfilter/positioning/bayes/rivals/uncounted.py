@@ -64,4 +64,7 @@ def walked_on(
     moved = predict(own, step, rng)[0]
     # Where it has led is no evidence against it: nobody rests beside the ways.
     moved = replace(moved, log_weight=own.log_weight)
+    # Nor is it one against the null hypothesis, which each metre costs something.
+    gone_m = moved.travelled_m - own.travelled_m
+    null = replace(null, travelled_m=null.travelled_m + gone_m)
     return HeldOtherwise(moved, hold, log(share / (1 - share)), travelled_m, null)
