@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import pytest
+from made_filters import belief
 
 from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.positioning.bayes.doubted import doubted
@@ -13,13 +14,19 @@ TURNED, EPOCH = Hold(1.0, 3.0), Epoch(1.0, (MotionStep(1.4, 0.3),))
 BELIEFS = SimpleNamespace(may_have_left=lambda _: False, is_pulled=lambda _: False)
 
 
+def rival(hold, *, elsewhere=True):
+    return SimpleNamespace(hold=hold, is_elsewhere=lambda _: elsewhere)
+
+
 @pytest.mark.parametrize("main", [Hold(), Hold(-1.0, 0.5, 0.3)])
 @pytest.mark.parametrize(
     ("uncounted_leads", "why"), [(True, Reason.MOTION_STUCK), (False, Reason.PHONE_TURNED)]
 )
 def test_the_likeliest_rival_tells_whether_the_counter_or_the_phone(main, uncounted_leads, why):
+    """The likeliest of those elsewhere: what is at the same place leaves no doubt."""
     holds = (main, TURNED) if uncounted_leads else (TURNED, main)
-    held = tuple(SimpleNamespace(hold=one) for one in holds)
-    state = SimpleNamespace(hold=main, contested=True, held=held)
+    near = rival(TURNED if uncounted_leads else main, elsewhere=False)
+    held = near, *(rival(one) for one in holds)
+    state = SimpleNamespace(belief=belief(), hold=main, contested=True, held=held)
     (found,) = doubted(BELIEFS, state, main, EPOCH, [], moves=True)
     assert (found.kind, found.reason) == ("motion", why)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from mapfilter.filters.contract import Reason
+from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.state import BayesState
@@ -44,10 +45,21 @@ def doubted(
     if state.contested and beliefs.is_pulled(state):
         return positions_in_doubt(epoch, unused)
     if moves and (taken_over or (epoch.motion and state.contested)):
-        # The likeliest rival comes first; one that reads headings alike has walked uncounted.
-        uncounted = not taken_over and any(one.hold == state.hold for one in state.held[:1])
-        return [_motion(epoch, Reason.MOTION_STUCK if uncounted else Reason.PHONE_TURNED)]
+        stuck = not taken_over and _has_walked_uncounted(state)
+        return [_motion(epoch, Reason.MOTION_STUCK if stuck else Reason.PHONE_TURNED)]
     return [_motion(epoch, Reason.OTHER_UNIT)] if other_unit else []
+
+
+def _has_walked_uncounted(state: BayesState) -> bool:
+    """Return whether the likeliest rival elsewhere reads headings as the belief does.
+
+    It is one of a walk of which no step was counted, then.
+    """
+    main = state.belief
+    if not isinstance(main, ParticleBelief):
+        return False
+    leading = next((one for one in state.held if one.is_elsewhere(main)), None)
+    return leading is not None and leading.hold == state.hold
 
 
 def _motion(epoch: Epoch, why: Reason) -> UnusedReading:
