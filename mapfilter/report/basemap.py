@@ -122,7 +122,7 @@ def draw_base(
         arrow = Look(arrowstyle="-|>", color=BLACK, linewidth=1.4, shrinkA=1)
         at = Look(xycoords="axes fraction", textcoords="offset points", arrowprops=arrow)
         north = axes.annotate("N", (north_at, 0.985), (0, -38), **at, **MAP_NAME, fontsize=9.5)
-        # It lies within the map, and where takes long to find out.
+        # It lies within the map; to measure where takes long.
         north.set(zorder=19, in_layout=False)
     return frame
 

@@ -10,7 +10,8 @@ from scipy.stats import multivariate_normal
 from mapfilter.filters.contract import MotionStep
 from mapfilter.positioning.epochs import Epoch, ReportRow
 from mapfilter.positioning.sensors.reported_levels import levels_of
-from mapfilter.positioning.sensors.rest import Rest, _added, _carried, _left
+from mapfilter.positioning.sensors.rest import Rest
+from mapfilter.positioning.sensors.rest_levels import added_nats, carried_nats_of, left_nats_of
 from mapfilter.positioning.sensors.watch import SensorWatch
 from mapfilter.positioning.sensors.watching import watched
 
@@ -55,10 +56,10 @@ def test_likelihoods_of_ways_and_rests_are_those_of_normal_vectors(changes, way_
         )
         return 0.5 * (one - other)
 
-    found = _left(first, {**now, "Z": (-50.0, 1)}, way_m, measured_m)
+    found = left_nats_of(first, {**now, "Z": (-50.0, 1)}, way_m, measured_m)
     expected = (ratio(changes), ratio([0.0] * count)) if way_m else (0.0, 0.0)
     assert found == pytest.approx(expected)
-    assert _left(first, {"Z": (-50.0, 1)}, way_m, measured_m) == (0.0, 0.0)
+    assert left_nats_of(first, {"Z": (-50.0, 1)}, way_m, measured_m) == (0.0, 0.0)
 
 
 def test_levels_elsewhere_differ_by_nine_decibels_and_by_less_along_the_way_measured():
@@ -70,9 +71,9 @@ def test_levels_elsewhere_differ_by_nine_decibels_and_by_less_along_the_way_meas
             multivariate_normal.logpdf(changes, np.zeros(2), own * np.eye(2) + 36.0)
             for own in (81.0, as_measured)
         )
-        assert _carried(first, now, measured_m) == pytest.approx(one - other)
+        assert carried_nats_of(first, now, measured_m) == pytest.approx(0.5 * (one - other))
     # Other cells say nothing.
-    assert _carried(first, {"C": (-50.0, 1)}, 0.0) == 0.0
+    assert carried_nats_of(first, {"C": (-50.0, 1)}, 0.0) == 0.0
 
 
 def test_what_is_measured_is_added_up_and_no_doubt():
@@ -83,11 +84,11 @@ def test_what_is_measured_is_added_up_and_no_doubt():
 
 
 def test_what_a_block_gains_is_bounded_and_so_is_the_sum_below():
-    assert _added(1.0, 2.0) == 3.0
-    assert _added(1.0, 9.0) == 4.0
-    assert _added(1.0, -9.0) == -2.0
-    assert _added(-11.0, -2.0) == -12.0
-    assert _added(100.0, 1.0) == 101.0
+    assert added_nats(1.0, 2.0) == 3.0
+    assert added_nats(1.0, 9.0) == 4.0
+    assert added_nats(1.0, -9.0) == -2.0
+    assert added_nats(-11.0, -2.0) == -12.0
+    assert added_nats(100.0, 1.0) == 101.0
 
 
 def test_levels_are_added_up_by_blocks_of_ten_seconds():
@@ -106,7 +107,7 @@ def test_levels_are_added_up_by_blocks_of_ten_seconds():
     assert rest.first == {"A": (-216.0, 3), "B": (-60.0, 1)}
     assert rest.present == {}
     # The way to the second block at the pace before.
-    gained, unchanged = _left({"A": (-216.0, 3)}, {"A": (-90.0, 1)}, 14.0, 0.0)
+    gained, unchanged = left_nats_of({"A": (-216.0, 3)}, {"A": (-90.0, 1)}, 14.0, 0.0)
     assert (rest.left_nats, rest.still_nats) == pytest.approx((gained, unchanged))
     assert gained > 0 > unchanged
 

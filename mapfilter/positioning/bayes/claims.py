@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from math import nan
 
+from mapfilter._changes import changed
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.certainty import Recovery, certainty
@@ -52,8 +53,8 @@ def judged(
             agrees = agrees and state.null.log_odds <= rules.converge_log_odds
             recovery = recovery.after(travelled_m, options.switch_hold_m, agrees=agrees)
         if uncertain or recovery is not None:
-            return replace(state, status=Status.UNCERTAIN, recovery=recovery)
-    return state if recovery is state.recovery else replace(state, recovery=recovery)
+            return changed(state, status=Status.UNCERTAIN, recovery=recovery)
+    return state if recovery is state.recovery else changed(state, recovery=recovery)
 
 
 def _contradicted(beliefs: BeliefFilters, state: BayesState) -> bool:
@@ -69,8 +70,8 @@ def _in_one_place(beliefs: BeliefFilters, state: BayesState) -> BayesState:
         return state
     if belief.summary.mass_50m < beliefs.options.split_mass:
         belief = replace(belief, status=Status.SEARCHING, agreement_start_m=nan)
-        return replace(state, belief=belief, status=Status.LOST, proven=False)
+        return changed(state, belief=belief, status=Status.LOST, proven=False)
     left = beliefs.may_have_left(state) or beliefs.is_unheard(state)
     if left or beliefs.is_contested(state):
-        return replace(state, status=Status.LOST, contested=True)
+        return changed(state, status=Status.LOST, contested=True)
     return state

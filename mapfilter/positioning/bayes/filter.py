@@ -240,7 +240,7 @@ class BayesPositioner(Filter[BayesState]):
                 positioned = gnss_of(state).was_used(epoch.time_s)
                 state = judged(self.beliefs, state, weighed=used, positioned=positioned)
         elif given.status is Status.UNCERTAIN:
-            state = replace(state, status=given.status)
+            state = changed(state, status=given.status)
         unused += doubted(self.beliefs, state, hold, epoch, unused, moves=motion is Reason.USED)
         gnss = gnss_of(state)
         if gnss.was_used(epoch.time_s):

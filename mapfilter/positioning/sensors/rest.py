@@ -19,37 +19,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from math import exp, inf, isfinite, log, nan, radians, sqrt
+from math import exp, inf, isfinite, nan, radians
 
 from mapfilter._same import EqualByValue
 from mapfilter.filters.contract import MotionStep
 from mapfilter.positioning.epochs import ReportRow
 from mapfilter.positioning.sensors.pace import WALKERS_MPS
 from mapfilter.positioning.sensors.reported_levels import levels_of
+from mapfilter.positioning.sensors.rest_levels import added_nats, carried_nats_of, left_nats_of
 from mapfilter.tracks.schema import SERVING
 
 _BLOCK_S = 10.0
-_AT_REST_DB, _ELSEWHERE_DB, _ALL_DB = 4.0, 9.0, 6.0
-"""Deviations of a level from an earlier one at rest, and elsewhere; of all levels together, as a
-phone is put into a pocket."""
-_BLOCK_SHARE = 0.5
-"""Power of a block's likelihoods: blocks near each other repeat the same deviation."""
 _CELLS_AT_REST, _M_PER_CELL, _NATS_PER_CELL, _CELLS_S = 3, 30.0, 2.5, 600.0
 _NATS_PER_S = 1 / 300
 """Serving cells that are usual at rest, the measured way for each that is usual besides, gain from
 each further one that has not served for so long, and what is forgotten with time: now and then
 others serve, also at rest."""
 _CARRIED_NATS = 6.0
-_FADING_DB, _WHITE_DB = 2.7, 3.3
-"""Deviation of a level at rest from its earlier mean, and of a single level besides."""
-_WAY_DB, _WAY_M = 10.5, 60.0
-"""Deviation of a level far along a way from that at its start; the distance of 1 - 1/e of its
-variance."""
-_MOST_NATS, _LEAST_NATS = 3.0, -12.0
-"""The most that a block gains, either way, and the least sum."""
-_STROLL_SHARE = 0.5
-"""Share of that variance which a way as measured explains, where it is compared with being
-elsewhere: with all of it, the two could hardly be told apart after 30 m."""
 _LEFT_M = 45.0
 """Way from which on a position is in doubt."""
 _NEAR_M = 25.0
@@ -174,11 +160,11 @@ class Rest(EqualByValue):
         if not isfinite(block_s):
             block_s = began_s = time_s
         elif time_s - block_s >= _BLOCK_S:
-            nats = max(nats + _BLOCK_SHARE * _carried(first, present, measured_m), 0.0)
+            nats = max(nats + carried_nats_of(first, present, measured_m), 0.0)
             nats = min(nats, _CARRIED_NATS)
             way_m = self.pace_mps * (block_s - began_s)
-            gained, unchanged = _left(first, present, way_m, measured_m)
-            left_nats, still_nats = _added(left_nats, gained), _added(still_nats, unchanged)
+            gained, unchanged = left_nats_of(first, present, way_m, measured_m)
+            left_nats, still_nats = added_nats(left_nats, gained), added_nats(still_nats, unchanged)
             block_s, first, present = time_s, {**present, **first}, {}
         for name, level_dbm in levels_of(rows):
             total, count = present.get(name, (0.0, 0))
@@ -262,65 +248,3 @@ class Rest(EqualByValue):
     def left_probability(self) -> float:
         """Probability that the phone was carried on at the pace before, by its levels alone."""
         return 1 / (1 + exp(-self.left_nats))
-
-
-def _carried(
-    first: Mapping[str, tuple[float, int]],
-    now: Mapping[str, tuple[float, int]],
-    measured_m: float,
-) -> float:
-    """Return the log-likelihood ratio of "elsewhere" to "as measured", by the levels of both."""
-    changes = [
-        now[name][0] / now[name][1] - first[name][0] / first[name][1]
-        for name in now
-        if name in first
-    ]
-    if not changes:
-        return 0.0
-    as_measured_db = sqrt(_AT_REST_DB**2 + _STROLL_SHARE * _on_way_db2(measured_m))
-    return _log_density(changes, _ELSEWHERE_DB) - _log_density(changes, as_measured_db)
-
-
-def _left(
-    first: Mapping[str, tuple[float, int]],
-    now: Mapping[str, tuple[float, int]],
-    way_m: float,
-    measured_m: float,
-) -> tuple[float, float]:
-    """Return the log-likelihood ratio of a way to that as measured, which is 0 at rest.
-
-    The second one is that of levels without a change.
-    """
-    pairs = [(now[name], first[name]) for name in now if name in first]
-    if not pairs or way_m <= measured_m:
-        return 0.0, 0.0
-    changes = [own[0] / own[1] - other[0] / other[1] for own, other in pairs]
-    per_mean = sum(1 / own[1] + 1 / other[1] for own, other in pairs) / len(pairs)
-    at_rest_db2 = _FADING_DB**2 + _WHITE_DB**2 * per_mean
-    as_measured_db = sqrt(at_rest_db2 + _on_way_db2(measured_m))
-    on_way_db = sqrt(at_rest_db2 + _on_way_db2(way_m))
-    ratios = (
-        _log_density(seen, on_way_db) - _log_density(seen, as_measured_db)
-        for seen in (changes, [0.0] * len(changes))
-    )
-    gained, unchanged = (_BLOCK_SHARE * ratio for ratio in ratios)
-    return gained, unchanged
-
-
-def _on_way_db2(way_m: float) -> float:
-    """Return the variance of how a level changes along a way."""
-    return _WAY_DB**2 * (1 - exp(-way_m / _WAY_M))
-
-
-def _added(nats: float, gained: float) -> float:
-    """Return a bounded sum with what a block gains."""
-    return max(nats + min(max(gained, -_MOST_NATS), _MOST_NATS), _LEAST_NATS)
-
-
-def _log_density(changes_db: list[float], sd_db: float) -> float:
-    """Return the log density of changes that share an error, up to a constant."""
-    count, mean = len(changes_db), sum(changes_db) / len(changes_db)
-    apart = sum((change - mean) ** 2 for change in changes_db)
-    shared_db2 = sd_db**2 + count * _ALL_DB**2
-    exponent = apart / sd_db**2 + count * mean**2 / shared_db2
-    return -0.5 * exponent - (count - 1) * log(sd_db) - 0.5 * log(shared_db2)
