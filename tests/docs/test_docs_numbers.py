@@ -25,6 +25,7 @@ from mapfilter.positioning.sensors import (
     places,
     repeats,
     rest,
+    rest_levels,
     stale_radio,
     undirected,
     unheard,
@@ -92,18 +93,22 @@ FAULTS = (
     f"of {WORDS[way_spread._PLACES]} places drawn",
     f"began at once (beyond {number(rest._BRAKES_MPS2)} m/s²), with a turn of "
     f"{number(degrees(rest._CORNER_RAD))}° within some {number(rest._CORNER_S)} s",
-    f"({number(rest._AT_REST_DB)} dB between two blocks of {number(rest._BLOCK_S)} s, besides "
-    f"{number(rest._ALL_DB)} dB that all cells share), elsewhere by "
-    f"{number(rest._ELSEWHERE_DB)} dB",
+    f"({number(rest_levels._AT_REST_DB)} dB between two blocks of {number(rest._BLOCK_S)} s, "
+    f"besides {number(rest_levels._ALL_DB)} dB that all cells share), elsewhere by "
+    f"{number(rest_levels._ELSEWHERE_DB)} dB",
     f"log-likelihood ratio reaches {number(rest._CARRIED_NATS)}",
     f"ten minutes adds {rest._NATS_PER_CELL:g}",
-    f"({rest._FADING_DB:g} dB, and {rest._WHITE_DB:g} dB for each single level)",
-    f"{rest._WAY_DB:g}^2 (1 - e^{{-x/{rest._WAY_M:g}}})",
-    f"to the power {rest._BLOCK_SHARE:g}, at most {rest._MOST_NATS:g} a block",
+    f"({rest_levels._FADING_DB:g} dB, and {rest_levels._WHITE_DB:g} dB for each single level)",
+    f"{rest_levels._WAY_DB:g}^2 (1 - e^{{-x/{rest_levels._WAY_M:g}}})",
+    f"to the power {rest_levels._BLOCK_SHARE:g}, at most {rest_levels._MOST_NATS:g} a block",
     f"From {number(rest._LEFT_M)} m at that pace on",
     f"while the sum is above {rest._SHOWN_NATS:g}, and again until it is below "
     f"{rest._SHOWN_AGAIN_NATS:g}",
     f"(the sum were above {rest._SHOWABLE_NATS:g},",
+    f"reach a sum that is lower by {rest._NATS_PER_FACTOR:g}",
+    f"from {number(rest._NEAR_M)} m at that pace on a walker's position",
+    f"times :math:`e^{{S/{rest._NATS_PER_FACTOR:g}}}`",
+    f"levels show it as clearly as those of a minute of rest do ({rest._CERTAIN_NATS:g})",
     f"after {number(unheard._RIDE_S)} s or more, of other cells",
     f"{stale_radio._NATS_PER_M:g} for each metre and level",
     f"at most {stale_radio._NATS_PER_REPORT:g} for one level or two, "

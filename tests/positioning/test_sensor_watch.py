@@ -13,8 +13,8 @@ from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.epochs import Epoch
 from mapfilter.positioning.merging import epochs
-from mapfilter.positioning.sensors import rest
 from mapfilter.positioning.sensors.rest import Rest
+from mapfilter.positioning.sensors.rest_levels import carried_nats_of
 from mapfilter.tracks.log import make_log
 
 
@@ -224,9 +224,9 @@ def test_likelihoods_of_changes_are_those_of_normal_vectors(changes):
             changes, np.zeros(count), sd_db**2 * np.eye(count) + 36.0 * np.ones((count, count))
         )
 
-    expected = log_density(9.0) - log_density(4.0)
-    assert rest._carried(first, now, 0.0) == pytest.approx(expected)
-    assert rest._carried(first, {"Z": (-80.0, 1)}, 0.0) == 0.0
+    expected = 0.5 * (log_density(9.0) - log_density(4.0))
+    assert carried_nats_of(first, now, 0.0) == pytest.approx(expected)
+    assert carried_nats_of(first, {"Z": (-80.0, 1)}, 0.0) == 0.0
 
 
 def test_a_log_that_begins_without_motion_is_left_alone():
