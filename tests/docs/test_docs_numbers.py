@@ -108,7 +108,8 @@ FAULTS = (
     f"reach a sum that is lower by {rest._NATS_PER_FACTOR:g}",
     f"from {number(rest._NEAR_M)} m at that pace on a walker's position",
     f"times :math:`e^{{S/{rest._NATS_PER_FACTOR:g}}}`",
-    f"levels show it as clearly as those of a minute of rest do ({rest._CERTAIN_NATS:g})",
+    f"levels show it as hardly any way does ({rest._CERTAIN_NATS:g})",
+    f"as clearly as those of a minute or more do (a sum of {rest._CLEAR_NATS:g} below)",
     f"after {number(unheard._RIDE_S)} s or more, of other cells",
     f"{stale_radio._NATS_PER_M:g} for each metre and level",
     f"at most {stale_radio._NATS_PER_REPORT:g} for one level or two, "

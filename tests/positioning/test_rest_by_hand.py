@@ -87,7 +87,8 @@ def test_what_a_block_gains_is_bounded_and_so_is_the_sum_below():
     assert added_nats(1.0, 2.0) == 3.0
     assert added_nats(1.0, 9.0) == 4.0
     assert added_nats(1.0, -9.0) == -2.0
-    assert added_nats(-11.0, -2.0) == -12.0
+    assert added_nats(-11.0, -2.0) == -13.0
+    assert added_nats(-20.0, -2.0) == -21.0
     assert added_nats(100.0, 1.0) == 101.0
 
 
@@ -315,28 +316,31 @@ def test_turns_are_kept_while_reports_come():
     assert (heard.turned_rad, heard.turned_s) == (rest.turned_rad, 2.0)
 
 
-LATE = Rest(100.0, pace_mps=1.25, left_nats=-6.0, still_nats=-2.5)
+LATE = Rest(100.0, pace_mps=1.25, left_nats=-5.0, still_nats=-2.5)
 """From 120 s on one may be 25 m away."""
 
 
 @pytest.mark.parametrize(
     ("rest", "time_s", "share"),
     [
-        # One in fifty such rests is none, e times fewer at a sum of -6, e² at -9 and 3 besides.
-        (LATE, 120.0, 0.02 * exp(-1)),
-        (replace(LATE, left_nats=-9.0), 120.0, 0.02 * exp(-1.5)),
-        (replace(LATE, left_nats=3.0), 500.0, 0.02),
+        # One in twenty such rests is none, e times fewer at a sum of -5, and e² at -10.
+        (LATE, 120.0, 0.05 * exp(-1)),
+        (replace(LATE, left_nats=-10.0), 120.0, 0.05 * exp(-2)),
+        (replace(LATE, left_nats=3.0), 500.0, 0.05),
         (LATE, 119.9, 0.0),
         (replace(LATE, measured_m=5.0), 120.0, 0.0),
-        (replace(LATE, measured_m=5.0), 124.0, 0.02 * exp(-1)),
+        (replace(LATE, measured_m=5.0), 124.0, 0.05 * exp(-1)),
+        # Levels could not show it yet, but speak against it.
+        (replace(LATE, still_nats=-2.0, left_nats=3.0), 120.0, 0.05),
         # Levels cannot show it, or have shown it; or it is known to be none; or a vehicle stands.
         (replace(LATE, still_nats=-2.4), 500.0, 0.0),
-        (replace(LATE, left_nats=-10.5), 500.0, 0.0),
-        (replace(LATE, left_nats=-10.4), 500.0, 0.02 * exp(-10.4 / 6)),
+        (replace(LATE, still_nats=0.0, left_nats=0.0), 500.0, 0.0),
+        (replace(LATE, left_nats=-19.5), 500.0, 0.0),
+        (replace(LATE, left_nats=-19.4), 500.0, 0.05 * exp(-19.4 / 5)),
         (replace(LATE, carried_nats=6.0), 500.0, 0.0),
         (replace(LATE, pace_mps=2.6), 500.0, 0.0),
     ],
 )
 def test_a_walker_may_have_left_unnoticed_until_levels_show_the_rest(rest, time_s, share):
-    odds = share / 0.98
+    odds = share / 0.95
     assert rest.left_share(time_s) == pytest.approx(odds / (1 + odds), rel=1e-12)

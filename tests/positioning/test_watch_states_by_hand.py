@@ -88,9 +88,13 @@ def test_whoever_rests_before_and_after_a_pause_has_rested():
         assert {reason for _, reason, _ in found[:-1]} == {Reason.USED}
 
 
-@pytest.mark.parametrize(("nats", "certain"), [(-10.5, True), (-10.4, False), (0.0, False)])
-def test_levels_show_a_rest_for_certain(nats, certain):
+@pytest.mark.parametrize(
+    ("nats", "clear", "certain"),
+    [(-19.5, True, True), (-19.4, True, False), (-10.5, True, False), (-10.4, False, False)],
+)
+def test_levels_show_a_rest_clearly_and_for_certain(nats, clear, certain):
     rest = replace(STILL, left_nats=nats)
-    assert rest.is_certain is certain
+    assert (rest.is_clear, rest.is_certain) == (clear, certain)
     # Not of one who is carried on.
+    assert not rest.carried().is_clear
     assert not rest.carried().is_certain

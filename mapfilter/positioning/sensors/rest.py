@@ -40,7 +40,7 @@ _LEFT_M = 45.0
 """Way from which on a position is in doubt."""
 _NEAR_M = 25.0
 """Way up to which one that no step is counted of leaves a position within 50 m."""
-_DEAD_SHARE, _NATS_PER_FACTOR = 0.02, 6.0
+_DEAD_SHARE, _NATS_PER_FACTOR = 0.05, 5.0
 """Assumed share of such rests that are none, as the counter has died; how much the sum has to fall
 for e times fewer simulated ways to reach it."""
 _SHOWABLE_NATS = -2.5
@@ -58,9 +58,12 @@ _NATS_PER_CORNER, _MOST_BY_CORNERS = 2.0, 5.0
 wheels that read zero may creep into a parking lot, or a phone is taken in the hand."""
 _SHOWN_NATS, _SHOWN_AGAIN_NATS = -1.0, -5.0
 """Sum at or below which levels show a rest, and do so again after a doubt."""
-_CERTAIN_NATS = -10.5
+_CLEAR_NATS = -10.5
 """Sum that a minute of way does not reach (none of 48 simulated ones), and 70 s of rest do (47 of
 52)."""
+_CERTAIN_NATS = -19.5
+"""Sum that less than 0.01 of the time of simulated ways is below, 50 to 200 m from their start, and
+half of the rests after two minutes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -199,12 +202,13 @@ class Rest(EqualByValue):
     def left_share(self, time_s: float) -> float:
         """Return the probability that a walker has left the place unnoticed by a time.
 
-        0 while one cannot be far, where levels cannot show a rest, and once they show it as clearly
-        as those of a minute at rest do.
+        0 while one cannot be far, where levels could not show a rest and do not speak against it,
+        and once it is certain.
         """
         way_m = self.pace_mps * (time_s - self.since_s) - self.measured_m
         told = self.is_certain or self.is_carried or self.pace_mps > WALKERS_MPS
-        if way_m < _NEAR_M or told or self.still_nats > _SHOWABLE_NATS:
+        mute = self.still_nats > _SHOWABLE_NATS and self.left_nats <= 0
+        if way_m < _NEAR_M or told or mute:
             return 0.0
         odds = _DEAD_SHARE * exp(min(self.left_nats, 0.0) / _NATS_PER_FACTOR)
         return odds / (1 - _DEAD_SHARE + odds)
@@ -227,8 +231,13 @@ class Rest(EqualByValue):
         return max(self.pace_mps - self.measured_m / gone_s, 0.0) if gone_s > 0 else 0.0
 
     @property
-    def is_certain(self) -> bool:
+    def is_clear(self) -> bool:
         """Whether levels show it as clearly as those of a minute at rest do."""
+        return not self.is_carried and self.left_nats <= _CLEAR_NATS
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether levels show it as hardly any way does: those of two minutes at rest do."""
         return not self.is_carried and self.left_nats <= _CERTAIN_NATS
 
     @property

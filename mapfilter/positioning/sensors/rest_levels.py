@@ -15,7 +15,7 @@ _FADING_DB, _WHITE_DB = 2.7, 3.3
 _WAY_DB, _WAY_M = 10.5, 60.0
 """Deviation of a level far along a way from that at its start; the distance of 1 - 1/e of its
 variance."""
-_MOST_NATS, _LEAST_NATS = 3.0, -12.0
+_MOST_NATS, _LEAST_NATS = 3.0, -21.0
 """The most that a block gains, either way, and the least sum."""
 _STROLL_SHARE = 0.5
 """Share of that variance which a way as measured explains, where it is compared with being

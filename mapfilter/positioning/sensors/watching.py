@@ -169,7 +169,7 @@ def _are_missing(pace: Pace, time_s: float) -> bool:
 
 def _has_rested_silently(watch: SensorWatch, time_s: float, step_unit_m: float) -> bool:
     """Return whether a walker's rows, taken for missing, had ended at a rest that levels show."""
-    if watch.rest is None or not watch.rest.is_certain or not _are_missing(watch.pace, time_s):
+    if watch.rest is None or not watch.rest.is_clear or not _are_missing(watch.pace, time_s):
         return False
     return step_unit_m * watch.pace.speed_mps <= WALKERS_MPS
 
