@@ -15,7 +15,14 @@ from mapfilter.positioning import integrity
 from mapfilter.positioning.bayes import assembly, carriageways, options
 from mapfilter.positioning.bayes.area import area_frame, area_tiles, opened_area, tiled_area
 from mapfilter.positioning.bayes.beliefs import belief_filters, first_hypotheses, path
-from mapfilter.positioning.bayes.rivals import alternative, hold_rules, mirrored, step_units
+from mapfilter.positioning.bayes.rivals import (
+    alternative,
+    bends,
+    held,
+    hold_rules,
+    mirrored,
+    step_units,
+)
 from mapfilter.positioning.gnss import options as gnss_options
 from mapfilter.positioning.gnss import state as gnss_state
 from mapfilter.positioning.gnss import trail, wander
@@ -124,6 +131,9 @@ FAULTS = (
     f"{number(HOLDS.longest_row_m)} m)",
     f"of {HOLDS.particles} to {2 * HOLDS.particles} hypotheses",
     f"Where a jump is less than {number(HOLDS.around_deg)}°",
+    f"more than {number(degrees(bends._BENT_RAD))}° from the direction of the last metres (a mean "
+    f"that falls off by 1/e in {number(bends._MEMORY_M)} m, of {number(bends._LEAST_M)} m or more)",
+    f"after {number(held._BEND_M)} m, or at a Bayes factor of {e_to(held._BEND_NATS)}, unless",
     f"odds that a jump is the phone's are {HOLDS.probability:g} to 1",
     f"turn it back with {WORDS[HOLDS.back_odds]} times these odds",
     f"From {e_to(HOLDS.lost_log_odds)} on (a probability of 0.27), with a position more than 50 m "

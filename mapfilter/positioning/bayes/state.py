@@ -22,6 +22,7 @@ from mapfilter.positioning.bayes.rivals.alternative import (
     MapBelief,
     NullHypothesis,
 )
+from mapfilter.positioning.bayes.rivals.bends import NO_DIRECTION, Straight
 from mapfilter.positioning.bayes.rivals.half_turns import HalfTurns
 from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
 from mapfilter.positioning.bayes.rivals.hold import Hold
@@ -81,6 +82,8 @@ class BayesState:
         How headings are read, and the unit of steps.
     walking_rad : float
         Heading of the last row of a walk, as measured.
+    straight : Straight
+        Direction of the last metres of a walk, as measured.
     held : tuple of HeldOtherwise
         Beliefs in which the phone was turned, tested against the belief.
     half_turns : HalfTurns
@@ -119,6 +122,7 @@ class BayesState:
     twin: MirroredTwin | None = None
     hold: Hold = field(default_factory=Hold)
     walking_rad: float = nan
+    straight: Straight = NO_DIRECTION
     held: tuple[HeldOtherwise, ...] = ()
     half_turns: HalfTurns = field(default_factory=HalfTurns)
     alternatives: int = 0

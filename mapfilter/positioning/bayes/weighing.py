@@ -249,6 +249,7 @@ class Weighing:
             # Headings are read as the alternative reads them.
             hold=hold_after_takeover(state) if taken_over else state.hold,
             walking_rad=state.walking_rad,
+            straight=state.straight,
             held=() if taken_over else state.held,
             half_turns=state.half_turns.anew() if taken_over else state.half_turns,
             alternatives=state.alternatives,

@@ -17,6 +17,7 @@ from mapfilter.positioning.bayes.beliefs.belief_changes import (
 )
 from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, MapBelief
+from mapfilter.positioning.bayes.rivals.bends import mirrored_before, without_earlier
 from mapfilter.positioning.bayes.rivals.half_turns import HalfTurns
 from mapfilter.positioning.bayes.rivals.held import HeldOtherwise, forked, still_open
 from mapfilter.positioning.bayes.rivals.mirrored import MirroredTwin, mirrored_step
@@ -154,6 +155,27 @@ class BeliefSet:
         beside = (*self.held, *forked(*by, around_probability=around))
         held = still_open(rules, beside, main, travelled_m)
         return replace(self, held=held, half_turns=turns.after(beside, held, main))
+
+    def at_bend(
+        self,
+        filters: BeliefFilters,
+        state: BayesState,
+        straight_rad: float,
+        travelled_m: float,
+        own: OwnDraws,
+    ) -> BeliefSet:
+        """Begin a belief in which the phone was mirrored before a bend; as of :meth:`at_jump`.
+
+        ``straight_rad`` is the direction before it, as measured.
+        """
+        main = self.main
+        tracked = main is not None and state.status is main.status is Status.TRACKING
+        rules, white_rad = filters.holds, filters.model.motion.white_rad
+        if not (rules.watched and tracked and isinstance(main, ParticleBelief)):
+            return self
+        by = rules, main, state.null, state.hold, straight_rad, travelled_m, white_rad
+        beside = (*without_earlier(self.held, main), mirrored_before(*by, own.forking))
+        return replace(self, held=still_open(rules, beside, main, travelled_m))
 
     def _turned_in_search(
         self,

@@ -17,6 +17,7 @@ from mapfilter.positioning.bayes.beliefs.belief_set import BeliefSet
 from mapfilter.positioning.bayes.beliefs.legs import NO_LEG, Leg, may_wait
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.rivals.alternative import MapBelief
+from mapfilter.positioning.bayes.rivals.bends import NO_DIRECTION, Straight
 from mapfilter.positioning.bayes.rivals.held import as_measured, jumps
 from mapfilter.positioning.bayes.rivals.own_draws import OwnDraws
 from mapfilter.positioning.bayes.rivals.unaided import without_positions
@@ -92,6 +93,7 @@ class _Move:
     path: RecentPath
     heading_rad: float
     walking_rad: float
+    straight: Straight
     compass: bool
     unused: list[UnusedReading]
 
@@ -126,6 +128,7 @@ class _Move:
             heading_rad=state.heading_rad,
             # Who stood may have turned there.
             walking_rad=state.walking_rad if stood_s <= filters.holds.longest_pause_s else nan,
+            straight=state.straight,
             compass=state.compass,
             unused=[],
         )
@@ -197,6 +200,7 @@ class _Move:
         elif not isfinite(row.spread_m):
             # An unmeasured way says nothing of the compass.
             self.compass = isfinite(row.heading_rad)
+        self.straight = self.straight.after(row)
         if isfinite(row.heading_rad) and row.step_m > 0:
             self.walking_rad = row.heading_rad
         elif isfinite(row.spread_m):
@@ -219,6 +223,14 @@ class _Move:
             jump_rad, gone_m = (self.walking_rad, row.heading_rad), self.reckoning.travelled_m
             known = self.filters, self.state, jump_rad, gone_m, self.own
             self.beliefs = self.beliefs.at_jump(*known, positioned=self.positioned)
+            self.straight = NO_DIRECTION
+        elif self.compass and not self.ranged and self.straight.bends(row):
+            self.finish_leg()
+            before_rad, gone_m = self.straight.heading_rad, self.reckoning.travelled_m
+            self.beliefs = self.beliefs.at_bend(
+                self.filters, self.state, before_rad, gone_m, self.own
+            )
+            self.straight = NO_DIRECTION
         before, self.reckoning = self.reckoning, self.reckoning.moved(step)
         if self.gathers and isinstance(belief, ParticleBelief) and may_wait(measured):
             self._join(measured, before)
@@ -259,6 +271,7 @@ class _Move:
             watch=watch,
             twin=self.beliefs.twin,
             walking_rad=self.walking_rad,
+            straight=self.straight,
             held=self.beliefs.held,
             half_turns=self.beliefs.half_turns,
             unaided=self.beliefs.unaided,

@@ -31,6 +31,12 @@ from mapfilter.positioning.bayes.rivals.alternative import NullHypothesis
 from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules, RivalRules
 
+SPEAKS_NATS = 1.0
+"""Log Bayes factor from which on something speaks for a rival that began at a bend."""
+_BEND_M, _BEND_NATS = 100.0, -2.0
+"""Distance after which one that nothing speaks for is given up, and log Bayes factor at which it is
+refuted: bends are many, and to either side of one beliefs come apart soon."""
+
 
 @dataclass(frozen=True, eq=False)
 class HeldOtherwise:
@@ -55,6 +61,8 @@ class HeldOtherwise:
     tells_half_turn : bool
         It began at a jump right round, as one of a turned phone: what becomes of it tells whether
         the walker has turned round.
+    at_bend : bool
+        It began at a bend of the way, as one of a phone that was mirrored before.
     """
 
     belief: ParticleBelief
@@ -65,6 +73,7 @@ class HeldOtherwise:
     ahead_m: float = nan
     from_scratch: bool = False
     tells_half_turn: bool = False
+    at_bend: bool = False
 
     def log_bayes_factor(self, main: ParticleBelief) -> float:
         """Return the logarithm of the Bayes factor against the main belief."""
@@ -204,17 +213,24 @@ def still_open(
     kept = [
         one
         for one in held
-        if one.log_bayes_factor(main) > rules.abandon_threshold
+        if one.log_bayes_factor(main) > _refuted_at(rules, one)
         and travelled_m - one.start_m < _undecided_m(rules, one, main)
     ]
     kept.sort(key=lambda one: -one.log_odds(main))
     return tuple(_compared(rules, one, main, travelled_m) for one in kept[: rules.max_beliefs])
 
 
+def _refuted_at(rules: RivalRules, one: HeldOtherwise) -> float:
+    """Return the log Bayes factor at which a belief is refuted."""
+    return max(rules.abandon_threshold, _BEND_NATS) if one.at_bend else rules.abandon_threshold
+
+
 def _undecided_m(rules: RivalRules, one: HeldOtherwise, main: ParticleBelief) -> float:
     """Return the distance for which a belief may stay undecided."""
-    leads = _leads(rules, one, main)
-    return max(rules.abandon_after_m, rules.abandon_ahead_after_m if leads else 0.0)
+    if _leads(rules, one, main):
+        return max(rules.abandon_after_m, rules.abandon_ahead_after_m)
+    waits = not one.at_bend or one.log_bayes_factor(main) >= SPEAKS_NATS
+    return rules.abandon_after_m if waits else min(rules.abandon_after_m, _BEND_M)
 
 
 def _compared(

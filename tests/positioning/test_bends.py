@@ -1,0 +1,165 @@
+"""A phone that was mirrored before a slow corner: a rival goes on to the other side."""
+
+from dataclasses import replace
+from math import exp, isnan, log, nan, pi, radians
+
+import numpy as np
+import pytest
+from noting_filters import TRACKING, Beliefs, belief, move, walking
+
+from mapfilter.filters.contract import MotionStep, Status
+from mapfilter.positioning.bayes.rivals.alternative import NullHypothesis
+from mapfilter.positioning.bayes.rivals.bends import Straight, mirrored_before, without_earlier
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise, still_open
+from mapfilter.positioning.bayes.rivals.hold import Hold
+from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
+
+
+def walked(*headings_deg, step_m=1.0):
+    straight = Straight()
+    for heading_deg in headings_deg:
+        straight = straight.after(MotionStep(step_m, radians(heading_deg)))
+    return straight
+
+
+def test_the_direction_of_the_last_metres():
+    straight = walked(*[10.0] * 9)
+    assert straight.heading_rad == pytest.approx(radians(10.0))
+    assert straight.way_m == pytest.approx(9.0)
+    # The last ones count more: e times as much as those of 12 m before.
+    turned = walked(*[0.0] * 12, *[90.0] * 12)
+    kept = exp(-1 / 12)
+    last = (1 - kept**12) / (1 - kept)
+    assert (turned.east_m, turned.north_m) == pytest.approx((last * kept**12, last))
+
+
+def test_after_less_than_eight_metres_there_is_none():
+    assert isnan(walked(*[0.0] * 7).heading_rad)
+    assert not isnan(walked(*[0.0] * 8).heading_rad)
+    assert not walked(*[0.0] * 7).bends(MotionStep(1.0, 3.0))
+
+
+@pytest.mark.parametrize(
+    ("step", "bends"),
+    [
+        (MotionStep(1.0, radians(34.0)), False),
+        (MotionStep(1.0, radians(36.0)), True),
+        (MotionStep(1.0, radians(-36.0)), True),
+        (MotionStep(1.0, radians(360.0)), False),
+        # Who stands may look round, and a step without a direction leads nowhere.
+        (MotionStep(0.0, radians(90.0)), False),
+        (MotionStep(1.0, nan, 0.5), False),
+        (MotionStep(nan, radians(90.0)), False),
+    ],
+)
+def test_where_a_way_bends(step, bends):
+    assert walked(*[0.0] * 20).bends(step) is bends
+
+
+def test_across_the_west_too():
+    west = walked(*[170.0, -170.0] * 10)
+    assert abs(west.heading_rad) > radians(175.0)
+    assert not west.bends(MotionStep(1.0, radians(-160.0)))
+    assert west.bends(MotionStep(1.0, radians(-120.0)))
+
+
+@pytest.mark.parametrize("step", [MotionStep(0.0, 1.0), MotionStep(nan, 1.0), MotionStep(1.0, nan)])
+def test_what_has_no_way_or_no_direction_changes_nothing(step):
+    before = walked(*[5.0] * 10)
+    assert before.after(step) == before
+
+
+def test_the_belief_beside_reads_turns_the_other_way():
+    main, null = belief(log_evidence=-5.0), NullHypothesis(-8.0)
+    rules = HoldRules(particles=10, probability=0.1, mirrored_odds=0.5)
+    turned = Hold(1.0, pi / 2)
+    by = null, turned, 0.3, 120.0, 0.0, np.random.default_rng(1)
+    rival = mirrored_before(rules, main, *by)
+    # Straight on as before, and a turn to the left is one to the right.
+    assert rival.hold.direction_rad(0.3) == pytest.approx(turned.direction_rad(0.3))
+    assert rival.hold.direction_rad(0.5) == pytest.approx(turned.direction_rad(0.3) - 0.2)
+    assert rival.log_prior == pytest.approx(log(0.1 / 0.9) + log(0.5))
+    assert (rival.start_m, rival.null, rival.belief.log_weight.size) == (120.0, null, 10)
+    assert rival.log_bayes_factor(replace(main, log_evidence=-6.0)) == 1.0
+    assert not rival.tells_half_turn
+    assert rival.at_bend
+
+
+@pytest.mark.parametrize(
+    ("nats", "gone_m", "stays", "beside_next"),
+    [
+        (0.0, 99.0, True, False),
+        (0.0, 100.0, False, False),
+        # Something speaks for it.
+        (1.0, 399.0, True, True),
+        (1.0, 400.0, False, True),
+        (0.9, 100.0, False, False),
+        (-1.9, 10.0, True, False),
+        (-2.0, 10.0, False, False),
+    ],
+)
+def test_how_long_it_stays(nats, gone_m, stays, beside_next):
+    main = belief()
+    rival = HeldOtherwise(belief(log_evidence=nats), Hold(-1.0), -6.5, 50.0, at_bend=True)
+    rules = HoldRules()
+    assert len(still_open(rules, (rival,), main, 50.0 + gone_m)) == stays
+    assert len(without_earlier((rival,), main)) == beside_next
+    # Those of a jump stay for longer, also beside one of a bend.
+    turned = replace(rival, at_bend=False)
+    assert len(still_open(rules, (turned,), main, 449.0)) == 1
+    assert len(without_earlier((turned,), main)) == 1
+
+
+def test_one_that_leads_stays_longest():
+    ahead = belief(log_evidence=9.0)
+    ahead = replace(ahead, state=ahead.state + np.float32(100.0))
+    rival = HeldOtherwise(ahead, Hold(-1.0), -6.5, 50.0, at_bend=True)
+    assert len(still_open(HoldRules(), (rival,), belief(), 1249.0)) == 1
+    assert still_open(HoldRules(), (rival,), belief(), 1250.0) == ()
+
+
+def at_a_bend(raw, *, status=TRACKING, rules=None, **changes):
+    """The state after a row of a tracked walk that went at 0.1 rad so far."""
+    straight = walked(*[np.degrees(0.1)] * 20)
+    given = {"straight": straight, "walking_rad": 0.4} | changes
+    return move(walking(status=status, **given), raw, beliefs=Beliefs(holds=rules or HoldRules()))[
+        0
+    ]
+
+
+def test_a_tracked_position_has_one_from_a_slow_corner_on():
+    # 0.6 rad further than the row before, which is no jump.
+    after = at_a_bend(MotionStep(2.0, 1.0))
+    (before,) = after.held
+    assert before.hold.sign == -1.0
+    assert before.hold.direction_rad(1.0) == pytest.approx(0.1 - 0.9)
+    # At the next bend another takes its place, unless something speaks for it.
+    later = at_a_bend(MotionStep(2.0, 1.0), held=(replace(before, start_m=-9.0),))
+    assert [one.start_m for one in later.held] == [0.0]
+    # The next corner is one of the way from here on.
+    assert after.straight == Straight().after(MotionStep(2.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("raw", "changes"),
+    [
+        (MotionStep(2.0, 0.6), {}),
+        (MotionStep(2.0, 1.0), {"status": Status.LOST}),
+        (MotionStep(2.0, 1.0), {"compass": False}),
+        (MotionStep(2.0, 1.0), {"rules": HoldRules(watched=False)}),
+        (MotionStep(2.0, 1.0), {"straight": Straight()}),
+    ],
+)
+def test_else_there_is_none(raw, changes):
+    assert at_a_bend(raw, **changes).held == ()
+
+
+def test_a_jump_has_it_among_its_own_and_begins_a_way():
+    after = at_a_bend(MotionStep(2.0, 2.0))
+    assert len(after.held) == 3
+    assert after.straight.way_m == 2.0
+
+
+def test_who_has_stood_may_turn_to_the_other_side_too():
+    (before,) = at_a_bend(MotionStep(2.0, 2.0), stepped_s=-90.0).held
+    assert before.hold.direction_rad(2.0) == pytest.approx(0.1 - 1.9)
