@@ -27,12 +27,12 @@ SMALL_CITY = (
 SHARES = (50, 67, 95, 99)
 
 
-def draw(folder: Path) -> list[Path]:
-    """Draw all pictures into a folder."""
+def draw(folder: Path, made: int = 20_000) -> list[Path]:
+    """Draw all pictures into a folder, those of made epochs with a number of them."""
     folder.mkdir(parents=True, exist_ok=True)
     return [
         draw_tails(folder / "protection-tail.png"),
-        draw_stanford(folder / "protection-stanford.png"),
+        draw_stanford(folder / "protection-stanford.png", made),
         draw_coverage(folder / "coverage-made.png"),
         draw_worst(folder / "worst-run.png"),
     ]
@@ -82,7 +82,7 @@ def made_epochs(narrowed: float, count: int, seed: int) -> tuple[np.ndarray, np.
 
 
 @styled
-def draw_stanford(path: Path, count: int = 20_000) -> Path:
+def draw_stanford(path: Path, count: int) -> Path:
     """Draw the Stanford diagrams of calibrated beliefs, and of beliefs that are too narrow."""
     figure = new_figure(12.4, 5.8)
     for axes, (name, narrowed) in zip(

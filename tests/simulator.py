@@ -6,20 +6,22 @@ The simulator has to be asked for before numba is loaded: hence a process of its
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def run_simulated(file: Path) -> None:
-    """Run a file of tests in a process that simulates the device."""
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-p", "no:cacheprovider"]
+def run_simulated(files: Sequence[Path]) -> None:
+    """Run files of tests in one process that simulates the device."""
+    command = [sys.executable, "-m", "pytest", "-x", "-n", "0", "-p", "no:cacheprovider"]
     done = subprocess.run(
-        [*command, str(file), "-W", "default"],
+        [*command, *map(str, files), "-W", "default"],
         env={**os.environ, "NUMBA_ENABLE_CUDASIM": "1"},
         cwd=ROOT,
         capture_output=True,
         text=True,
     )
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-1000:]
-    assert " passed" in done.stdout
+    for file in files:
+        assert f"{file.relative_to(ROOT)} ." in done.stdout

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import OptimizeResult, minimize
 
 from mapfilter._types import Bools, Floats, Ints
-from mapfilter.learning.likelihood import report_log_likelihood
+from mapfilter.learning.likelihood import report_log_likelihood, report_slope
 
 REFERENCE_M = 300.0
 NEAREST_M = 20.0
@@ -21,7 +21,7 @@ _LEAST, _MOST = 20, 3000
 _OFFSET_SD_DB, _SLOPE_SD_DB = 5.0, 8.0
 _FEW_CELLS, _START_DB = 6, 9.0
 _FAULTS = 0.1
-_CELLS_SD_DB = 2.0
+_CELLS_SD_DB, _FAULT_SD_DB = 2.0, 12.0
 
 
 @dataclass(frozen=True)
@@ -78,18 +78,29 @@ def calibrate(
     weight, decades = every * weight[some], log_distance(distance_m[some])
     cells, which = np.unique(cell, return_inverse=True)
 
-    def cost(values: Floats) -> float:
+    def cost(values: Floats) -> tuple[float, Floats]:
+        """Return the cost of offset, slope and offsets of cells, and its derivatives by them."""
         own = values[2:]
         z = (excess_db - values[0] - values[1] * decades - own[which]) / sd_db
         total = weight @ report_log_likelihood(z, received, sd_db)
+        slope = weight * report_slope(z, received, sd_db) / sd_db
         spike = np.log1p(-_FAULTS) - 0.5 * (own / _CELLS_SD_DB) ** 2 - np.log(_CELLS_SD_DB)
-        slab = np.log(_FAULTS) - 0.5 * (own / 12.0) ** 2 - np.log(12.0)
-        common = (values[0] / _OFFSET_SD_DB) ** 2 + (values[1] / _SLOPE_SD_DB) ** 2
-        return float(0.5 * common - total - np.logaddexp(spike, slab).sum())
+        slab = np.log(_FAULTS) - 0.5 * (own / _FAULT_SD_DB) ** 2 - np.log(_FAULT_SD_DB)
+        either = np.logaddexp(spike, slab)
+        common = values[:2] / (_OFFSET_SD_DB, _SLOPE_SD_DB)
+        precision = np.exp(spike - either) / _CELLS_SD_DB**2
+        precision += np.exp(slab - either) / _FAULT_SD_DB**2
+        derivatives = np.concatenate(
+            [
+                common / (_OFFSET_SD_DB, _SLOPE_SD_DB) + (slope.sum(), slope @ decades),
+                np.bincount(which, slope, cells.size) + precision * own,
+            ]
+        )
+        return float(0.5 * common @ common - total - either.sum()), derivatives
 
     def fitted(offsets_db: Floats) -> OptimizeResult:
         first = np.array([start.offset_db, start.slope_db, *offsets_db])
-        return minimize(cost, first, method="L-BFGS-B", options={"maxiter": 40})
+        return minimize(cost, first, jac=True, method="L-BFGS-B", options={"maxiter": 40})
 
     # One faulty cell with many visits draws the class towards itself; from there it does not find
     # back, so each cell is taken for faulty once.

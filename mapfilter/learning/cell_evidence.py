@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import Literal
 
@@ -14,11 +15,13 @@ from mapfilter._types import Floats, Ints
 from mapfilter.learning.likelihood import (
     OFFSETS_DB,
     LevelNoise,
+    excess_db,
     log_likelihoods,
     log_sum,
     marginal,
     posterior_offset,
 )
+from mapfilter.learning.offset_sums import OffsetSums
 from mapfilter.learning.patterns import Patterns, bearing_places
 from mapfilter.learning.visits import Visits
 
@@ -39,6 +42,8 @@ PRIOR: Mapping[str, float] = MappingProxyType(
 TURNS_DEG = tuple(float(turn) for turn in range(30, 360, 30))
 _MOVED_REACH_M, _MOVED_STEP_M, _MOVED_LEAST_M = 600.0, 75.0, 120.0
 _COARSE_DB: Floats = np.arange(-24.0, 24.5, 4.0)
+_VISITS_AT_ONCE = 1 << 13
+"""Of several places: more take more memory, and no less time each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +102,16 @@ class Scene:
     journeys: int
     look_far: bool = True
 
+    @cached_property
+    def sums(self) -> OffsetSums:
+        """Sums of log-likelihoods for each offset of a cell."""
+        return OffsetSums(self.noise.sd_db, OFFSETS_DB)
+
+    @cached_property
+    def coarse_sums(self) -> OffsetSums:
+        """The same for few offsets, by which many places are compared."""
+        return OffsetSums(self.noise.sd_db, _COARSE_DB)
+
 
 class CellEvidence:
     """The hypotheses of one cell, each computed once."""
@@ -147,9 +162,7 @@ class CellEvidence:
         one = patterns.plan.cells[self.cell]
         places = bearing_places(patterns, _MOVED_STEP_M, _MOVED_REACH_M, self.cell)
         away = np.hypot(places[:, 0] - one.east_m, places[:, 1] - one.north_m)
-        by_place = np.array(
-            [self._coarse(patterns.elsewhere(self.cell, *place)) for place in places.tolist()]
-        )
+        by_place = np.array(list(self._coarse(places)))
         far = away >= _MOVED_LEAST_M
         here = float(by_place[np.argmin(away)])
         alone = self.fine().log_evidence, self.offset().log_evidence
@@ -162,11 +175,17 @@ class CellEvidence:
         evidence = max(alone) + evidence - max(here, *alone)
         return replace(found, log_evidence=evidence, value=float(away[best]), place_m=place)
 
-    def _coarse(self, level_dbm: Floats) -> float:
-        expected = level_dbm[self.place] + self.shift
-        floor_dbm, sd_db = self.scene.patterns.floor_dbm, self.scene.noise.sd_db
-        each = log_likelihoods(self.visits, expected, floor_dbm, sd_db, _COARSE_DB)
-        return marginal(self.weight @ each, self.scene.noise.fault_sd_db / 2, _COARSE_DB)
+    def _coarse(self, places: Ints | Floats) -> Iterator[float]:
+        """Yield the evidence of each place that the cell may stand in."""
+        scene, at_once = self.scene, max(1, _VISITS_AT_ONCE // len(self.visits))
+        for first in range(0, len(places), at_once):
+            some = places[first : first + at_once].tolist()
+            level = np.array(
+                [scene.patterns.elsewhere(self.cell, *one)[self.place] for one in some]
+            )
+            above_db = self.visits.level_dbm - level - self.shift
+            for total in scene.coarse_sums.of(above_db, self.visits.received, self.weight):
+                yield marginal(total, scene.noise.fault_sd_db / 2, _COARSE_DB)
 
     def _of(self, turn_deg: float, other: int) -> tuple[Explanation, Explanation]:
         """Return a pattern in the usual state, and with an offset that is a fault."""
@@ -193,22 +212,15 @@ class CellEvidence:
         """Yield what levels say under the deviation of the cell's offset in each kind of state."""
         scene = self.scene
         floor_dbm, noise_db = scene.patterns.floor_dbm, scene.noise.sd_db
-        each = log_likelihoods(self.visits, level_dbm + self.shift, floor_dbm, noise_db)
-        total = self.weight @ each if len(self.visits) else np.zeros(OFFSETS_DB.size)
-        unshifted = self._by_journey(each[:, OFFSETS_DB.size // 2])
-        for kind, sd_db in kinds.items():
-            mean, spread = posterior_offset(total, sd_db)
-            at = int(np.argmin(np.abs(OFFSETS_DB - mean)))
-            yield Explanation(
-                kind,
-                marginal(total, sd_db),
-                level_dbm,
-                mean,
-                spread,
-                self._by_journey(each[:, at]),
-                unshifted,
-                value,
-            )
+        given = self.visits, level_dbm + self.shift, floor_dbm
+        total = scene.sums.of(excess_db(*given), self.visits.received, self.weight)
+        found = [posterior_offset(total, sd_db) for sd_db in kinds.values()]
+        at = [int(np.argmin(np.abs(OFFSETS_DB - mean))) for mean, _ in found]
+        each = log_likelihoods(*given, noise_db, OFFSETS_DB[[*at, OFFSETS_DB.size // 2]])
+        *by_journey, unshifted = map(self._by_journey, each.T)
+        for (kind, sd_db), offset, own in zip(kinds.items(), found, by_journey, strict=True):
+            evidence = marginal(total, sd_db)
+            yield Explanation(kind, evidence, level_dbm, *offset, own, unshifted, value)
 
     def _by_journey(self, each: Floats) -> Floats:
         counted = np.bincount(self.visits.journey, each * self.weight, self.scene.journeys)

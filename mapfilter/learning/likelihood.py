@@ -74,13 +74,24 @@ def log_likelihoods(
     floor_dbm : float
         Of the database.
     """
-    below = np.isnan(expected_dbm)
-    expected = np.where(below, floor_dbm - _BELOW_FLOOR_DB, expected_dbm)
-    z = (visits.level_dbm - expected)[:, None] - offsets_db
+    z = excess_db(visits, expected_dbm, floor_dbm)[:, None] - offsets_db
     z /= sd_db
     found = report_log_likelihood(z, visits.received, sd_db)
-    found[below & ~visits.received] = 0.0
+    found[np.isnan(z)] = 0.0
     return found
+
+
+def excess_db(visits: Visits, expected_dbm: Floats, floor_dbm: float) -> Floats:
+    """Return how far levels, and bounds, are above their prediction; NaN where none says anything.
+
+    Parameters
+    ----------
+    expected_dbm, floor_dbm
+        As in :func:`log_likelihoods`.
+    """
+    below = np.isnan(expected_dbm)
+    expected = np.where(below, floor_dbm - _BELOW_FLOOR_DB, expected_dbm)
+    return np.where(below & ~visits.received, np.nan, visits.level_dbm - expected)
 
 
 def report_log_likelihood(z: Floats, received: Bools, sd_db: float) -> Floats:
@@ -96,6 +107,17 @@ def report_log_likelihood(z: Floats, received: Bools, sd_db: float) -> Floats:
     density = (1.0 - OUTLIERS) / (sd_db * np.sqrt(2 * np.pi))
     found[received] = np.log(density * np.exp(-0.5 * z[received] ** 2) + OUTLIERS / RANGE_DB)
     found[~received] = np.log((1.0 - OUTLIERS) * ndtr(z[~received]) + OUTLIERS)
+    return found
+
+
+def report_slope(z: Floats, received: Bools, sd_db: float) -> Floats:
+    """Return the derivative of :func:`report_log_likelihood` by z."""
+    found = np.empty(z.shape)
+    level, bound = z[received], z[~received]
+    density = (1.0 - OUTLIERS) / (sd_db * np.sqrt(2 * np.pi)) * np.exp(-0.5 * level**2)
+    found[received] = -level * density / (density + OUTLIERS / RANGE_DB)
+    density = (1.0 - OUTLIERS) / np.sqrt(2 * np.pi) * np.exp(-0.5 * bound**2)
+    found[~received] = density / ((1.0 - OUTLIERS) * ndtr(bound) + OUTLIERS)
     return found
 
 

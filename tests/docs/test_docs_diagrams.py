@@ -10,7 +10,7 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
 def test_every_drawn_picture_is_shown_and_every_shown_one_is_drawn(tmp_path):
-    made = run_path(str(DOCS / "diagrams.py"))["draw"](tmp_path)
+    made = run_path(str(DOCS / "diagrams.py"))["draw"](tmp_path, made=500)
     shown = {
         name
         for page in DOCS.rglob("*.rst")

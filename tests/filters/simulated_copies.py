@@ -1,6 +1,6 @@
 """Noisy copies by the kernel of a graphics processor, in numba's simulator.
 
-Run by :mod:`test_device_copies` in a process of its own.
+Run by :mod:`test_device_kernels` in a process of its own.
 """
 
 import numpy as np

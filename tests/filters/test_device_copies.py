@@ -1,9 +1,6 @@
-"""Copies of particles on a graphics processor, in numba's simulator; none ask for no device."""
-
-from pathlib import Path
+"""Copies of particles on a graphics processor: none ask for no device."""
 
 import numpy as np
-from simulator import run_simulated
 
 from mapfilter.filters import cuda_copies, resampling
 
@@ -13,7 +10,3 @@ def test_no_copies_ask_for_no_device():
     given = state, chosen, np.ones(3, np.float32), np.uint64(1), np.empty((3, 0), np.float32)
     cuda_copies.copy_with_jitter(*given)
     resampling.copy_with_jitter(0, 0, *given)
-
-
-def test_copies_in_the_simulator():
-    run_simulated(Path(__file__).with_name("simulated_copies.py"))

@@ -9,11 +9,15 @@ from scipy.stats import norm
 from mapfilter.learning.calibration import Calibration, calibrate
 from mapfilter.learning.likelihood import (
     OFFSETS_DB,
+    excess_db,
     log_likelihoods,
     marginal,
     posterior_offset,
+    report_log_likelihood,
+    report_slope,
     visit_weights,
 )
+from mapfilter.learning.offset_sums import OffsetSums
 from mapfilter.learning.visits import Visits
 
 
@@ -83,6 +87,57 @@ def test_likelihoods_are_those_of_a_normal_error_with_outliers():
         heard = math.log(0.9 * norm.pdf(-80.0, -85.0 + offset_db, 8.0) + 0.1 / 60.0)
         missed = math.log(0.9 * norm.cdf(-100.0, -95.0 + offset_db, 8.0) + 0.1)
         assert found[:, at] == pytest.approx([heard, missed, 0.0])
+
+
+@pytest.mark.parametrize("received", [True, False])
+def test_slopes_are_those_of_the_likelihood(received):
+    z, step = np.linspace(-9.0, 9.0, 37), 1e-5
+    are_levels = np.full(z.size, received)
+    after, before = (report_log_likelihood(z + by, are_levels, 7.0) for by in (step, -step))
+    found = report_slope(z, are_levels, 7.0)
+    assert np.ptp(found) > 0.3
+    np.testing.assert_allclose(found, (after - before) / (2 * step), rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("sd_db", [5.0, 9.0, 14.0])
+@pytest.mark.parametrize("offsets_db", [OFFSETS_DB, np.arange(-24.0, 24.5, 4.0)])
+def test_sums_over_visits_are_those_of_their_likelihoods(sd_db, offsets_db):
+    """Also of levels that are far from all offsets, at both ends of the range, and below it."""
+    rng = np.random.default_rng(3)
+    level_dbm = np.concatenate([rng.uniform(-130.0, -40.0, 300), [-900.0, 700.0, -220.0, 60.0]])
+    received = rng.random(level_dbm.size) < 0.6
+    expected = rng.uniform(-120.0, -50.0, level_dbm.size)
+    expected[::7] = np.nan
+    weight = rng.random(level_dbm.size)
+    visits, sums = visits_of(level_dbm, received), OffsetSums(sd_db, offsets_db)
+    each = log_likelihoods(visits, expected, -104.0, sd_db, offsets_db)
+    above_db = excess_db(visits, expected, -104.0)
+    assert 10 < np.isnan(above_db).sum() < 40
+    found = sums.of(above_db, received, weight)
+    np.testing.assert_allclose(found, weight @ each, rtol=0, atol=4e-6 * weight.sum())
+    # Several cases at once, such as places of a cell.
+    both = sums.of(np.stack([above_db + 3.0, above_db]), received, weight)
+    np.testing.assert_allclose(both[1], found, rtol=1e-13)
+    np.testing.assert_allclose(both[0], sums.of(above_db + 3.0, received, weight), rtol=1e-13)
+
+
+@pytest.mark.parametrize("sd_db", [5.0, 14.0])
+@pytest.mark.parametrize("received", [True, False])
+def test_a_sum_is_right_between_nodes_as_well(sd_db, received):
+    above_db = np.linspace(-90.0, 90.0, 1801)
+    are_levels, sums = np.full(above_db.size, received), OffsetSums(sd_db, OFFSETS_DB)
+    each = report_log_likelihood((above_db[:, None] - OFFSETS_DB) / sd_db, are_levels, sd_db)
+    one = np.ones(1)
+    found = [sums.of(above_db[[k]], are_levels[[k]], one) for k in range(above_db.size)]
+    np.testing.assert_allclose(found, each, rtol=0, atol=4e-6)
+
+
+def test_no_visits_add_up_to_nothing():
+    none = np.zeros(0)
+    assert (
+        OffsetSums(8.0, OFFSETS_DB).of(none, none.astype(bool), none).tolist()
+        == [0.0] * OFFSETS_DB.size
+    )
 
 
 def test_offsets_are_integrated_and_estimated_as_in_closed_form():

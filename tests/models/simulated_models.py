@@ -1,6 +1,6 @@
 """Kernels of a graphics processor beside those of the processor, in numba's simulator.
 
-Run by :mod:`test_device_models` in a process of its own. What the kernels of the processor are
+Run by :mod:`test_device_kernels` in a process of its own. What the kernels of the processor are
 given is that of :mod:`test_model_kernel_parts`.
 """
 

@@ -1,9 +1,6 @@
-"""Motion, map and reports on a graphics processor: numba's simulator, and nothing for none."""
-
-from pathlib import Path
+"""Motion, map and reports on a graphics processor: no hypotheses ask for none."""
 
 import numpy as np
-from simulator import run_simulated
 
 from mapfilter.models import cuda_motion, cuda_reports
 from mapfilter.models.fingerprint import RasterFrame
@@ -19,7 +16,3 @@ def test_no_hypotheses_ask_for_no_device():
     pixel = np.empty(0, np.int32)
     cuda_reports.pixels(state, RasterFrame(0.0, 10.0, 0.2, 2, 2), pixel)
     cuda_reports.age(state, np.ones(3, np.float32), 0.5, -2.0)
-
-
-def test_kernels_in_the_simulator():
-    run_simulated(Path(__file__).with_name("simulated_models.py"))

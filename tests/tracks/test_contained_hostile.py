@@ -14,6 +14,7 @@ from shapely.geometry import MultiPoint, Point
 from mapfilter.errors import InputError
 from mapfilter.tracks.joining.recordings import read_recordings
 from mapfilter.tracks.open_options import OpenOptions
+from mapfilter.tracks.readers.contained import json_tables
 from mapfilter.tracks.readers.formats import read_recording
 
 START_S = 1_777_629_330
@@ -100,13 +101,18 @@ def test_half_a_letter_in_json(tmp_path):
     assert len(positions_of(written(tmp_path, "own.json", content))) == 1
 
 
-def test_json_that_blows_up_is_refused(tmp_path):
+def test_json_that_blows_up_is_refused(tmp_path, monkeypatch):
     sparse = [{**ROWS[0], f"k{at}": 1} for at in range(3000)]
     with pytest.raises(InputError, match=r"1000 different names.*likely: export"):
         read_recording(written(tmp_path, "sparse.json", json.dumps(sparse)))
-    crossed = {**ROWS[0], **{f"k{at}": 1 for at in range(20_000)}, "l": [{"x": 1}] * 2600}
+    # Four thousandths of the limit: as many values as that take ten seconds.
+    assert json_tables.MOST_VALUES == 50_000_000
+    monkeypatch.setattr(json_tables, "MOST_VALUES", 200_000)
+    crossed = {**ROWS[0], **{f"k{at}": 1 for at in range(80)}, "l": [{"x": 1}] * 2600}
     with pytest.raises(InputError, match="5e7 values in all"):
         read_recording(written(tmp_path, "crossed.json", json.dumps([crossed, ROWS[0]])))
+    crossed["l"] = crossed["l"][:2200]
+    assert positions_of(written(tmp_path, "less.json", json.dumps([crossed, ROWS[0]]))) is not None
     nested = ROWS[0]
     for _ in range(20):
         nested = {**ROWS[0], "a": [nested]}
