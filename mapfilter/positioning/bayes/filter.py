@@ -210,9 +210,7 @@ class BayesPositioner(Filter[BayesState]):
         wait = self._waits(given, usable)
         state, unused = moved(self.beliefs, state, usable.watch, epoch, rng, wait)
         waiting = (
-            wait is not None
-            and state.belief is given.belief
-            and wait(state.reckoning.travelled_m)
+            wait is not None and state.belief is given.belief and wait(state.reckoning.travelled_m)
         )
         if motion is not Reason.USED:
             unused = [UnusedReading(epoch.time_s, "motion", "", motion)]
@@ -246,7 +244,9 @@ class BayesPositioner(Filter[BayesState]):
                 state = judged(self.beliefs, state, weighed=used, positioned=positioned)
         elif given.status is Status.UNCERTAIN:
             state = changed(state, status=given.status)
-        unused += doubted(self.beliefs, state, given.hold, epoch, unused, moves=motion is Reason.USED)
+        unused += doubted(
+            self.beliefs, state, given.hold, epoch, unused, moves=motion is Reason.USED
+        )
         gnss = gnss_of(state)
         if gnss.was_used(epoch.time_s):
             last_fix = state.last_fix if epoch.gnss is None else epoch.gnss
