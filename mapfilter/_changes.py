@@ -29,8 +29,13 @@ else:
         Place(east_m=1.0, north_m=3.0)
         """
         names, held = value.__dataclass_fields__, value.__dict__
-        if not fields.keys() <= names.keys():
-            raise TypeError(f"no fields of {type(value).__name__}: {fields.keys() - names.keys()}")
         copy = object.__new__(type(value))
-        copy.__dict__.update({name: held[name] for name in names}, **fields)
+        own = copy.__dict__
+        own.update(held)
+        if len(held) > len(names):
+            for name in held.keys() - names.keys():
+                del own[name]
+        own.update(fields)
+        if len(own) > len(names):
+            raise TypeError(f"no fields of {type(value).__name__}: {own.keys() - names.keys()}")
         return copy

@@ -6,6 +6,8 @@ uniform number (Kitagawa 1996). The mean number of copies of a particle is N tim
 
 from __future__ import annotations
 
+from math import isfinite
+
 import numpy as np
 from numba import njit
 
@@ -123,7 +125,7 @@ def log_sum(log_weight: Floats) -> float:
     True
     """
     highest = log_weight.max(initial=-np.inf)
-    if not np.isfinite(highest):
+    if not isfinite(highest):
         return float(highest)
     return float(highest + np.log(np.exp(log_weight - highest).sum()))
 

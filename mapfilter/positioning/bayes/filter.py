@@ -40,7 +40,7 @@ from mapfilter.positioning.bayes.sources.radio import RadioSource
 from mapfilter.positioning.bayes.sources.timing import TimingSource
 from mapfilter.positioning.bayes.sources.usable import UsableEpoch, usable_epoch
 from mapfilter.positioning.bayes.state import BayesState, belief_here, check_state
-from mapfilter.positioning.bayes.waiting import waits
+from mapfilter.positioning.bayes.waiting import report_alone, waits
 from mapfilter.positioning.bayes.warm_up import run_kernels
 from mapfilter.positioning.bayes.weighing import Weighing
 from mapfilter.positioning.epoch_checks import check_epoch
@@ -203,18 +203,21 @@ class BayesPositioner(Filter[BayesState]):
         check_state(state, self.area)
         check_later(epoch, state.watch.times.epoch_s)
         check_generator(rng)
-        spacing_m, hold, given = state.particle_spacing_m, state.hold, state
-        state = _tracked(state)
+        given, state = state, _tracked(state)
         before, weighing = state.status, self._weighing
         usable = usable_epoch(state, epoch, by_ways=self.beliefs.by_ways)
         epoch, motion, radio = usable.epoch, usable.motion, usable.radio
         wait = self._waits(given, usable)
         state, unused = moved(self.beliefs, state, usable.watch, epoch, rng, wait)
-        travelled_m = state.reckoning.travelled_m
+        waiting = (
+            wait is not None and state.belief is given.belief and wait(state.reckoning.travelled_m)
+        )
         if motion is not Reason.USED:
             unused = [UnusedReading(epoch.time_s, "motion", "", motion)]
         unused += usable.unused
-        state, updates = weighing.collected(state, epoch, spacing_m)
+        updates = report_alone(self._radio, state, epoch) if waiting else None
+        if updates is None:
+            state, updates = weighing.collected(state, epoch, given.particle_spacing_m)
         for update in updates:
             unused += update.unused
         reasons = (update.reason for update in updates if update.reason is not None)
@@ -226,7 +229,7 @@ class BayesPositioner(Filter[BayesState]):
             if started is not None:
                 belief, sources = started
                 state = changed(state, belief=belief, sources={**state.sources, **sources})
-        elif state.belief is not given.belief or not wait or not wait(travelled_m):
+        elif not waiting or state.belief is not given.belief:
             # Else nothing is read of it.
             moved_only = state.belief
             measured = usable.is_measured
@@ -241,7 +244,9 @@ class BayesPositioner(Filter[BayesState]):
                 state = judged(self.beliefs, state, weighed=used, positioned=positioned)
         elif given.status is Status.UNCERTAIN:
             state = changed(state, status=given.status)
-        unused += doubted(self.beliefs, state, hold, epoch, unused, moves=motion is Reason.USED)
+        unused += doubted(
+            self.beliefs, state, given.hold, epoch, unused, moves=motion is Reason.USED
+        )
         gnss = gnss_of(state)
         if gnss.was_used(epoch.time_s):
             last_fix = state.last_fix if epoch.gnss is None else epoch.gnss

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import chain
-from math import isfinite
+from math import isfinite, nan
 
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.sources.evidence import EvidenceUpdate
 from mapfilter.positioning.bayes.sources.radio import RadioSource
 from mapfilter.positioning.bayes.sources.usable import UsableEpoch
 from mapfilter.positioning.bayes.state import BayesState
@@ -41,6 +41,18 @@ def waits(
     return lambda travelled_m: not (has_report and radio.due(used, travelled_m))
 
 
+def report_alone(
+    radio: RadioSource, state: BayesState, epoch: Epoch
+) -> list[EvidenceUpdate] | None:
+    """Return the evidence of an epoch at which beliefs wait: why its report is not used.
+
+    None where it has rows of other kinds, of which their sources tell.
+    """
+    if epoch.gnss is not None or epoch.pseudoranges or epoch.tdoa:
+        return None
+    return [radio.read(state.sources[radio.name], state.reckoning, epoch, nan)]
+
+
 def _may_wait(beliefs: BeliefFilters, state: BayesState, usable: UsableEpoch) -> bool:
     """Return whether beliefs may wait, unless a report of the epoch is due."""
     if not isinstance(state.belief, ParticleBelief) or state.contested:
@@ -67,6 +79,7 @@ def _measures(epoch: Epoch) -> bool:
     """Return whether an epoch measures something else than motion, cells and levels."""
     if epoch.gnss is not None:
         return True
-    ranges = (one.pseudorange_m for one in epoch.pseudoranges)
-    times = (one.difference_m for one in epoch.tdoa), (row.timing_advance for row in epoch.radio)
-    return any(map(isfinite, chain(ranges, *times)))
+    values = [row.timing_advance for row in epoch.radio]
+    values += [one.pseudorange_m for one in epoch.pseudoranges]
+    values += [one.difference_m for one in epoch.tdoa]
+    return any(map(isfinite, values))

@@ -138,7 +138,9 @@ class UndirectedWay(NamedTuple):
         if isfinite(step.heading_rad) or (turns and self.rows):
             if self.waiting_m != 0:
                 step = replace(step, step_m=step.step_m + self.waiting_m)
-            return _DIRECTED._replace(heading_rad=step.heading_rad), step
+            heading_rad = step.heading_rad
+            way = UndirectedWay(rows=True, directed=True, since_m=0.0, heading_rad=heading_rad)
+            return way, step
         way_m = abs(step.step_m)
         known = self.directed or turns or isfinite(step.spread_m)
         if isfinite(leg_m) and not known and way_m > 0:
@@ -162,9 +164,6 @@ class UndirectedWay(NamedTuple):
         since_m, seen_m, gone_m = self.since_m + way_m, self.seen_m + way_m, self.gone_m + way_m
         after = self._replace(rows=True, since_m=since_m, seen_m=seen_m, gone_m=gone_m)
         return after, step
-
-
-_DIRECTED = UndirectedWay(rows=True, directed=True, since_m=0.0)
 
 
 def _apart_m(fix: GnssFix | None) -> float:

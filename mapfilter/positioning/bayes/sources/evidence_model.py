@@ -93,7 +93,7 @@ class EvidenceModel:
         # A serving cell that the map lacks weighs all hypotheses in the area alike.
         used = reading.serving_weight > 0
         if used or reading.serving >= 0 or reading.levels is not None or reading.bounds:
-            beyond, used = np.flatnonzero(self.area.beyond(cloud.state)), True
+            beyond, used = self.area.beyond(cloud.state).nonzero()[0], True
             before = log_weight[beyond]
             memory, kept, pixel = self._found(cloud, reading)
             other, served = 0.0, NOT_SERVED

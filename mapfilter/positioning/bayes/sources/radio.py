@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from math import exp, isfinite, nan
 from typing import ClassVar
 
@@ -203,7 +204,7 @@ class RadioSource(EvidenceSource):
 
         They are of layers of which the phone measures neighbours.
         """
-        area, present = self.area, self._present(epoch)
+        present = self._present(epoch)
         full = sum(row.role != SERVING for row in epoch.radio) >= self.options.full_list
         rows: dict[int, list[ReportRow]] = {}
         for row in epoch.radio:
@@ -213,22 +214,30 @@ class RadioSource(EvidenceSource):
         for layer, some in rows.items():
             if sum(row.role != SERVING for row in some) < _NEIGHBOURS_FOR_ABSENCE:
                 continue
-            of_layer = np.flatnonzero(area.layer_of == layer).tolist()
+            of_layer = self._bands_of_layer.get(layer, [])
             levels = [row.level_dbm for row in some if isfinite(row.level_dbm)]
-            listed = levels and (full or not area.interfering.isdisjoint(of_layer))
-            limit_dbm = min(levels) if listed else area.floor_dbm
+            listed = levels and (full or not self.area.interfering.isdisjoint(of_layer))
+            limit_dbm = min(levels) if listed else self.area.floor_dbm
             found.update(dict.fromkeys((b for b in of_layer if b not in present), limit_dbm))
         return dict(sorted(found.items()))
 
     def _layers_of(self, row: ReportRow) -> set[int]:
         """Return the layers that a row is of, or may be of, also of a cell that is not known."""
-        layer_of = self.area.layer_of
-        if not layer_of.any():
+        if self._bands_of_layer.keys() <= {0}:
             return {0}
+        layer_of = self.area.layer_of
         bands = self._bands_of(row)
         if not bands and row.arfcn is not None:
             bands = self.area.carriers.get((row.arfcn, -1), ())
         return {int(layer_of[band]) for band in bands}
+
+    @cached_property
+    def _bands_of_layer(self) -> dict[int, list[int]]:
+        """Bands of the cells of each layer."""
+        found: dict[int, list[int]] = {}
+        for band, layer in enumerate(self.area.layer_of.tolist()):
+            found.setdefault(layer, []).append(band)
+        return found
 
     def _present(self, epoch: Epoch) -> set[int]:
         """Return the bands that rows of a report are of, or may be of, with and without levels."""
