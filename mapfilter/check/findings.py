@@ -47,6 +47,8 @@ REMEDIES = {
     "east-north-swapped": "Exchange the columns east and north.",
     "eirp-missing": "Name the column of the EIRP in cells.columns.eirp_dbm, or set cells.eirp_dbm, "
     "which is then taken for all cells without one.",
+    "eirp-of-carrier": "Give the EIRP of one subcarrier, as phones report it: that of the carrier "
+    "less 10 log10 of the number of subcarriers, 28 to 35 dB. Levels are too high by that.",
     "eirp-watts": "Turn watts into dBm, 10 log10(1000 W), antenna gain included.",
     "feet-for-metres": "Give metres: a foot is 0.3048 m, and a US survey foot 0.3048006 m.",
     "field-strength": "Export received levels in dBm, not field strengths (dBµV/m).",
