@@ -44,6 +44,7 @@ _SETTING = re.compile(
 _OPTIONS = {"bayes": "BayesFilter", "grid": "GridFilter", "kalman": "KalmanFilter"}
 _PLAN_LAYOUT = re.compile(r'\bcells\.layout = "(\w+)"')
 _PLAN_COLUMN = re.compile(r"\bcells\.columns\.(\w+)")
+_PLAN_CRS = re.compile(r"(?<![\w./\\-])cells\.crs\b(?!\.\w)")
 _PLAN_DEFAULT = re.compile(r"(?<![\w./\\-])cells\.([a-z]+_[a-z_]+)\b(?!\.\w)")
 """A setting, and no name of a file."""
 _RASTERS = 'rasters.resolution_m and rasters.resampling = "bilinear"'
@@ -69,11 +70,14 @@ def in_python(text: str) -> str:
     'set layout="atoll", or name it in columns={"east": …}'
     >>> in_python("set cells.eirp_dbm; else name what it holds in [cells.columns]")
     'set defaults={"eirp_dbm": …}; else name what it holds in columns'
+    >>> in_python("metres where EPSG:32635 is used, or their CRS in cells.crs")
+    'metres where EPSG:32635 is used, or their CRS in plan_crs'
     >>> in_python("cells.new_plan.csv row 7")
     'cells.new_plan.csv row 7'
     """
     text = _PLAN_LAYOUT.sub(r'layout="\1"', text).replace("[cells.columns]", "columns")
     text = _PLAN_COLUMN.sub(r'columns={"\1": …}', text)
+    text = _PLAN_CRS.sub("plan_crs", text)
     text = _PLAN_DEFAULT.sub(r'defaults={"\1": …}', text)
     text = _SETTING.sub(_option, text).replace(_RASTERS, _OPENED)
     text = text.replace("--zone of convert and replay", "zone of mf.read_log")

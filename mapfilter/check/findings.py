@@ -9,6 +9,7 @@ from operator import attrgetter
 from typing import Literal, Self, get_args
 
 from mapfilter.errors import Fault, MapfilterError
+from mapfilter.radio.cell_places import ZONE_IN_FRONT
 
 Severity = Literal["error", "warning", "note"]
 """The worst one first."""
@@ -36,9 +37,9 @@ REMEDIES = {
     "cell-without-raster": "Add the rasters, or take the cells out of the plan.",
     "code-reused-nearby": "Correct carrier (arfcn) or code (bsic) of one of them, or take out "
     "the cell that is no more; filters weigh a neighbour less that may be either.",
-    "crs-mixed": "Set the CRS that the numbers were made in (column crs of the plan, rasters.crs, "
+    "crs-mixed": "Set the CRS that the numbers were made in (cells.crs, rasters.crs, "
     "area.crs), or project the file.",
-    "datum-shifted": "Name the CRS that the numbers were made in: column crs of the plan, "
+    "datum-shifted": "Name the CRS that the numbers were made in: cells.crs, "
     "rasters.crs (ED50: EPSG:4230, in UTM zones EPSG:230xx).",
     "degrees-for-metres": "Name columns of degrees lat and lon, or give metres in a projected CRS; "
     "of rasters by gdalwarp -t_srs EPSG:….",
@@ -46,6 +47,8 @@ REMEDIES = {
     "east-north-swapped": "Exchange the columns east and north.",
     "eirp-missing": "Name the column of the EIRP in cells.columns.eirp_dbm, or set cells.eirp_dbm, "
     "which is then taken for all cells without one.",
+    "eirp-of-carrier": "Give the EIRP of one subcarrier, as phones report it: that of the carrier "
+    "less 10 log10 of the number of subcarriers, 28 to 35 dB. Levels are too high by that.",
     "eirp-watts": "Turn watts into dBm, 10 log10(1000 W), antenna gain included.",
     "feet-for-metres": "Give metres: a foot is 0.3048 m, and a US survey foot 0.3048006 m.",
     "field-strength": "Export received levels in dBm, not field strengths (dBµV/m).",
@@ -111,7 +114,8 @@ REMEDIES = {
     "plan-columns": "Name the columns that are of use in [cells.columns].",
     "raster-factor": "Set rasters.factor to the dB per stored unit, as the planning tool's export "
     "states it; if it is right, check the EIRP in the plan.",
-    "raster-without-cell": "Add the cells to the plan, or take the rasters out.",
+    "raster-without-cell": "Add the cells to the plan, or move the rasters to another folder: "
+    "those of terrain or clutter are none of a cell.",
     "rasters-invalid": "Correct or export the raster anew.",
     "rasters-missing": "Run `mapfilter predict`, or correct rasters.path.",
     "ground-truth-missing": "Correct rasters.ground_truth, or leave it out and predict.",
@@ -138,7 +142,7 @@ _BY_HINT = {
     "metres given for degrees": "metres-for-degrees",
     "degrees given for metres": "degrees-for-metres",
     "east and north swapped": "east-north-swapped",
-    "eastings with the number of a zone in front, as of EPSG:4647": "crs-mixed",
+    ZONE_IN_FRONT: "crs-mixed",
     "another CRS": "crs-mixed",
     "feet given for metres": "feet-for-metres",
     "gons given for degrees": "azimuth-gons",

@@ -76,7 +76,9 @@ def sampled(
         what the quantity can be, or with a number that means no data, are left out.
     """
     groups = _Groups()
-    for cell_id in rasters.cell_ids:
+    # What is none of a cell may be terrain or clutter: its numbers are not those of levels.
+    of_cells = [one for one in rasters.cell_ids if plan is not None and one in plan]
+    for cell_id in of_cells or rasters.cell_ids:
         cell = plan[cell_id] if plan is not None and cell_id in plan else None
         try:
             sample = sample_raster(rasters, cell_id, cell)

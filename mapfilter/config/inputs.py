@@ -112,6 +112,9 @@ class Cells(Section):
         Cell list; without one, cells are laid out by rule.
     layout : {"plan", "atoll", "opencellid"}
         Columns of the list: mapfilter's cell plan, Atoll's transmitters or OpenCellID.
+    crs : str, optional
+        CRS of east and north in the list, where it is another than that of rasters or area and no
+        column states it.
     reach_m : float
         Cells of an OpenCellID list farther than this from the area are left out.
     antennas : Path, optional
@@ -137,6 +140,7 @@ class Cells(Section):
 
     plan: FilePath | None = None
     layout: Literal["plan", "atoll", "opencellid"] = "plan"
+    crs: str | None = None
     reach_m: NotNegative = 5000.0
     antennas: FilePath | None = None
     sites: Annotated[int, Ge(1), Le(1000)] = 2

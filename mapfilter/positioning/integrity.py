@@ -28,6 +28,7 @@ from numba import njit
 from numpy.typing import ArrayLike
 
 from mapfilter._types import Floats, Floats32
+from mapfilter._words import number_of
 from mapfilter.errors import ConfigError, fail
 from mapfilter.filters.hypotheses import RINGS_PER_SQRT_M
 
@@ -77,7 +78,7 @@ def usable_risk(risk: float, p_none: float) -> float:
     return (risk - p_none) / (1 - p_none) if p_none < 1 else -1.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SampleTail:
     """The tail of a cloud of weighted positions, by distance from the reported position.
 
@@ -98,6 +99,10 @@ class SampleTail:
     scale_m: float
     effective: float
     p_none: float = 0.0
+
+    def __repr__(self) -> str:
+        some = number_of(self.mass.size, "distance")
+        return f"SampleTail({some}, scale {self.scale_m:.3g} m, p_none {self.p_none:.2g})"
 
     def outside(self, radius_m: float) -> float:
         """Return the share of the samples beyond a radius."""

@@ -16,6 +16,9 @@ from mapfilter.radio.cell_layouts import OFFSETS
 from mapfilter.radio.cell_rows import Row
 from mapfilter.radio.plan_systems import unit_name
 
+ZONE_IN_FRONT = (
+    "eastings with the number of a zone in front, as of EPSG:4647 or Gauss-Krüger (EPSG:31467)"
+)
 _NEAR_DEG, _ZONE_M, _WIDEST_ZONE_FT = 3.0, 1e6, 2.8e6
 
 
@@ -61,7 +64,8 @@ def move_from_sites(rows: list[Row], table: Arranged) -> tuple[str, ...]:
 
 def _metre_fault(east: float, north: float, crs: str) -> tuple[str, str, str] | None:
     unit = unit_name(crs)
-    expected, got = f"{unit} where {crs} is used", f"{east:g}, {north:g}"
+    expected = f"{unit} where {crs} is used, or their CRS in cells.crs"
+    got = f"{east:.9g}, {north:.9g}"
     if max(abs(east), abs(north)) <= 180 and (_near(crs, east, north) or _near(crs, north, east)):
         return expected, got, f"degrees given for {unit}"
     if _near(crs, *_degrees(crs, east, north)):
@@ -69,7 +73,7 @@ def _metre_fault(east: float, north: float, crs: str) -> tuple[str, str, str] | 
     zone_m = east // _ZONE_M * _ZONE_M if east > _WIDEST_ZONE_FT else 0.0
     likely = {
         "east and north swapped": (north, east),
-        "eastings with the number of a zone in front, as of EPSG:4647": (east - zone_m, north),
+        ZONE_IN_FRONT: (east - zone_m, north),
     }
     if unit == "metres":
         likely["feet given for metres"] = FOOT_M * east, FOOT_M * north

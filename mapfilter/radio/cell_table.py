@@ -64,10 +64,11 @@ def read_plan(
     layout: Layout = "plan",
     columns: Mapping[str, str] | None = None,
     defaults: Mapping[str, float] | None = None,
+    own_crs: str | None = None,
 ) -> PlanRows:
     """Read and check every row of a cell plan, or of a list of another layout.
 
-    Faults of rows are added to ``faults``.
+    Faults of rows are added to ``faults``. ``own_crs`` is that of rows that state none.
 
     Raises
     ------
@@ -91,6 +92,12 @@ def read_plan(
     ]
     stated = (given.get("crs", "") for given in lines)
     known = stated_systems(stated, f"{path}, {arranged.shown.get('crs', 'crs')}", faults)
+    if own_crs is not None:
+        if not {"east", "north"} <= set(arranged.header):
+            hint = "degrees are in WGS 84: leave it out"
+            raise fail(InputError, "cells.crs", "positions as east and north", "none", hint)
+        known |= stated_systems([own_crs], "cells.crs", faults)
+        lines = [{**given, "crs": given.get("crs") or own_crs} for given in lines]
     rows = [
         row_of(f"{path} row {line}", line, given, arranged, known, faults)
         for (line, _), given in zip(arranged.rows, lines, strict=True)

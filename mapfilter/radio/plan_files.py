@@ -40,6 +40,7 @@ def read_cell_plan(
     columns: Mapping[str, str] | None = None,
     defaults: Mapping[str, float] | None = None,
     bounds_m: Sequence[float] | Floats | None = None,
+    plan_crs: str | None = None,
 ) -> CellPlan:
     """Read a cell plan from a CSV file, a workbook or a table and bring it into ``crs``.
 
@@ -68,6 +69,8 @@ def read_cell_plan(
         number (``indoor``: 0 or 1), except a position.
     bounds_m : four floats, optional
         West, south, east, north: cells beyond them are left out with a note.
+    plan_crs : str, optional
+        CRS of the east and north of rows that state none; ``crs`` when left out.
 
     Raises
     ------
@@ -86,6 +89,7 @@ def read_cell_plan(
             Entries("columns", columns, str, "a column's name", "the column of each field"),
             Entries("defaults", defaults, Real, "a number", "the value of each field"),
             Setting("bounds_m", bounds_m, _BOUNDS_M),
+            Setting("plan_crs", plan_crs, str | None),
         ],
     )
     faults = Faults()
@@ -95,7 +99,8 @@ def read_cell_plan(
     usual = {name: float(value) for name, value in (defaults or {}).items()}
     table = table_of_frame(path) if is_frame(path) else read_table(Path(path), "a cell plan")
     path = table.path
-    rows, notes, inactive = read_plan(table, projected_crs(crs), faults, layout, columns, usual)
+    frame = projected_crs(crs)
+    rows, notes, inactive = read_plan(table, frame, faults, layout, columns, usual, plan_crs)
     known = {each.name for each in fields(Cell)}
     whole = [row for row in rows if not row.faulty]
     if layout == "opencellid" and whole:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 from mapfilter._words import number_of
-from mapfilter.radio.cells import CellPlan
+from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.layers import SHARED_CARRIER, layer_numbers
 from mapfilter.radio.reported_power import MOST_SUBCARRIER_DBM
 
@@ -54,13 +54,18 @@ def assumed_notes(plan: CellPlan) -> tuple[str, ...]:
     return (f"usual values for what the plan lacks, so levels err by more: {named} cells",)
 
 
-def carrier_notes(plan: CellPlan) -> tuple[str, ...]:
-    """Return a note on the cells whose power is that of a whole carrier; none without any."""
-    carriers = [
+def of_carriers(plan: CellPlan) -> list[Cell]:
+    """Return the cells of LTE and NR whose power is that of a whole carrier."""
+    return [
         cell
         for cell in plan.cells
         if cell.technology in _SUBCARRIERS and cell.eirp_dbm > MOST_SUBCARRIER_DBM
     ]
+
+
+def carrier_notes(plan: CellPlan) -> tuple[str, ...]:
+    """Return a note on the cells whose power is that of a whole carrier; none without any."""
+    carriers = of_carriers(plan)
     if not carriers:
         return ()
     return (

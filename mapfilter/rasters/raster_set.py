@@ -259,6 +259,8 @@ def check_against_plan(rasters: RxLevRasters, plan: CellPlan) -> None:
     missing = [cell_id for cell_id in plan.ids if cell_id not in held]
     hint = switched_off(unknown, plan)
     hint = hint or in_other_case(unknown, missing) or _several_of_one(unknown, missing)
+    if not missing:
+        hint = hint or "cells left out of the plan, or rasters of terrain or clutter: move these"
     hint = hint or "rasters and plan of different dates or places"
     if unknown:
         got = listed([repr(one) for one in unknown])

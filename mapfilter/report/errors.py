@@ -33,6 +33,7 @@ from mapfilter.report.canvas import (
     styled,
     tidy,
 )
+from mapfilter.report.pauses import broken_at_pauses
 
 _SIZE_IN = (9.0, 4.8)
 _SHADES = {
@@ -60,7 +61,8 @@ def plot_error_over_distance(
     """Draw the position error over the true distance travelled.
 
     The error's axis is logarithmic where hundreds of metres become few; the filter's own radii are
-    a band, its protection levels dotted; epochs without a position leave a gap. Marks the switch
+    a band, its protection levels dotted; epochs without a position, and pauses without an epoch,
+    leave a gap. Marks the switch
     from searching to tracking, the 50 m that count as success there, the mean and the 67 and 95 %
     errors after it, and where the filter was searching, uncertain, lost or outside of the map.
     ``single_reports_m`` are errors of reports that were located one by one: their median is a line.
@@ -89,25 +91,27 @@ def plot_error_over_distance(
     if np.isfinite(beside_m):
         dash_dot = Look(color=GREY, linewidth=1.2, linestyle=(0, (7, 2, 1, 2)))
         axes.axhline(beside_m, label=f"reports without motion, median {beside_m:.0f} m", **dash_dot)
-    radii_m = estimate.radii_m.T
-    if np.isfinite(radii_m[2]).any():
-        for radius_m in radii_m:
-            axes.fill_between(distance_m, radius_m, color=ORANGE, alpha=0.16, linewidth=0)
+    at_m, radii_m, levels_m, drawn_m = broken_at_pauses(
+        estimate, distance_m, estimate.radii_m, estimate.protection_m, errors_m
+    )
+    if np.isfinite(radii_m[:, 2]).any():
+        for radius_m in radii_m.T:
+            axes.fill_between(at_m, radius_m, color=ORANGE, alpha=0.16, linewidth=0)
         band = Look(color=ORANGE, linewidth=1.1, label="95 % radius; darker: 67, 50 %")
-        axes.plot(distance_m, radii_m[2], **band)
-    levels_m = np.where(np.isfinite(estimate.protection_m), estimate.protection_m, np.nan)
+        axes.plot(at_m, radii_m[:, 2], **band)
+    levels_m = np.where(np.isfinite(levels_m), levels_m, np.nan)
     if np.isfinite(levels_m).any():
         dotted = Look(color=PURPLE, linewidth=1.1, linestyle=(0, (1, 1.5)))
-        axes.plot(distance_m, levels_m, label="protection level", **dotted)
+        axes.plot(at_m, levels_m, label="protection level", **dotted)
     if known_m.size:
-        axes.plot(distance_m, errors_m, color=BLUE, linewidth=1.5, label="error")
+        axes.plot(at_m, drawn_m, color=BLUE, linewidth=1.5, label="error")
     if score.switched:
-        at_m, error_m = float(truth.distance_at(score.switch_time_s)), score.error_at_switch_m
+        from_m, error_m = float(truth.distance_at(score.switch_time_s)), score.error_at_switch_m
         star = Look(markersize=15, markeredgecolor="white", zorder=6, clip_on=False)
-        name = f"switch: {error_m:.0f} m off after {at_m:.0f} m"
+        name = f"switch: {error_m:.0f} m off after {from_m:.0f} m"
         if score.success is None:
             name = "switch: where the truth is not known"
-        axes.plot([at_m], [error_m], "*", color=VERMILLION, label=name, **star)
+        axes.plot([from_m], [error_m], "*", color=VERMILLION, label=name, **star)
         for figure, after_m, dashes, colour in (
             ("mean", score.error_mean_m, "-", BLACK),
             ("67 %", score.error_67_m, (0, (6, 2)), GREEN),
@@ -116,7 +120,7 @@ def plot_error_over_distance(
             if np.isfinite(after_m):
                 look = Look(color=colour, linestyle=dashes, linewidth=1.4, zorder=5)
                 name = f"{figure} after the switch: {after_m:.1f} m"
-                axes.plot([at_m, length_m], [after_m, after_m], label=name, **look)
+                axes.plot([from_m, length_m], [after_m, after_m], label=name, **look)
     else:
         text = axes.text(0.5, 0.55, "never switched to tracking", transform=axes.transAxes)
         text.set(ha="center", color=GREY, fontsize=12, path_effects=HALO)
@@ -147,7 +151,8 @@ def plot_errors_over_time(
         axes.axvspan(begin_s, end_s, color=shade, linewidth=0, zorder=0, label=name)
     for (name, estimate), colour in zip(estimates.items(), _COLOURS, strict=False):
         errors_m = position_errors_m(estimate, truth).clip(_LEAST_M)
-        axes.plot(estimate.time_s, errors_m, color=colour, linewidth=1.4, label=name)
+        drawn = broken_at_pauses(estimate, estimate.time_s, errors_m)
+        axes.plot(*drawn, color=colour, linewidth=1.4, label=name)
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")
     axes.set_ylim(bottom=_LEAST_M)
@@ -177,7 +182,10 @@ def plot_errors_apart(
     """
     if not estimates:
         raise fail(InputError, "estimates", "one or more, by their names", "none")
-    errors_m = {n: position_errors_m(one, truth).clip(_LEAST_M) for n, one in estimates.items()}
+    drawn = {
+        name: broken_at_pauses(one, one.time_s, position_errors_m(one, truth).clip(_LEAST_M))
+        for name, one in estimates.items()
+    }
     rows = -(-len(estimates) // _PANELS_WIDE)
     figure = new_figure(_PANELS_WIDE * _PANEL_IN[0], rows * _PANEL_IN[1] + 0.5)
     panels = figure.subplots(rows, _PANELS_WIDE, sharex=True, sharey=True, squeeze=False).ravel()
@@ -187,7 +195,7 @@ def plot_errors_apart(
         for other in estimates:
             behind = Look(color="#c8c8c8", linewidth=0.7, zorder=1.5)
             look = Look(color=BLUE, linewidth=1.5, zorder=3) if other == name else behind
-            axes.plot(estimates[other].time_s, errors_m[other], **look)
+            axes.plot(*drawn[other], **look)
         axes.set_title(name, fontsize=10.5)
         tidy(axes, grid=False)
         if index + _PANELS_WIDE >= len(estimates):

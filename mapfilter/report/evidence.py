@@ -20,6 +20,7 @@ from mapfilter.report.canvas import (
     tidy,
 )
 from mapfilter.report.errors import covers, shade_statuses
+from mapfilter.report.pauses import broken_at_pauses
 
 _EVIDENCE_IN = (9.0, 5.6)
 _SQUARE_M, _SQUARE_S = 25.0, 20.0
@@ -49,13 +50,15 @@ def plot_evidence(estimate: TrackEstimate, truth: Truth | None, *, title: str = 
     figure = new_figure(*_EVIDENCE_IN)
     above, below = figure.subplots(2, 1, sharex=True)
     entropy_bits = running_mean(along, evidence.entropy_bits, window)
-    above.plot(along, entropy_bits, color=BLUE, linewidth=1.5, label=f"entropy, mean over {mean}")
+    at, entropy_bits, mass, runner_up = broken_at_pauses(
+        estimate, along, entropy_bits, 100 * estimate.mass_50m, 100 * evidence.runner_up_mass
+    )
+    above.plot(at, entropy_bits, color=BLUE, linewidth=1.5, label=f"entropy, mean over {mean}")
     above.set_ylabel("entropy over 25 m squares / bit")
     above.set_ylim(bottom=0.0)
     within = f"within {SUCCESS_RADIUS_M:.0f} m of the leading hypothesis"
-    below.plot(along, 100 * estimate.mass_50m, color=VERMILLION, linewidth=1.5, label=within)
-    runner_up = 100 * evidence.runner_up_mass
-    below.plot(along, runner_up, color=ORANGE, linewidth=1.2, label="runner-up")
+    below.plot(at, mass, color=VERMILLION, linewidth=1.5, label=within)
+    below.plot(at, runner_up, color=ORANGE, linewidth=1.2, label="runner-up")
     below.set(xlabel=across, ylabel="probability / %", ylim=(0.0, 104.0))
     below.set_xlim(float(along[0]), max(float(np.max(along)), float(along[0]) + 1.0))
     for axes in (above, below):

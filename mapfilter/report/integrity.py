@@ -34,6 +34,7 @@ from mapfilter.report.canvas import (
     tidy,
 )
 from mapfilter.report.errors import distance_along_m, shade_statuses
+from mapfilter.report.pauses import broken_at_pauses
 from mapfilter.report.track import plot_track
 
 _SIDE_IN = 6.4
@@ -209,7 +210,8 @@ def plot_worst_run(
         (errors_m, BLUE, "error"),
     ):
         if np.isfinite(values).any():
-            right.plot(distance_m, np.clip(values, _LEAST_M, None), color=colour, label=name)
+            drawn = broken_at_pauses(estimate, distance_m, np.clip(values, _LEAST_M, None))
+            right.plot(*drawn, color=colour, label=name)
     if np.isfinite(errors_m[worst]):
         star = Look(color=BLACK, markersize=11, linestyle="", zorder=6)
         right.plot(distance_m[worst], max(errors_m[worst], _LEAST_M), "*", label="worst", **star)

@@ -78,14 +78,15 @@ def _draw_distance(axes: Axes, groups: Groups) -> None:
 
 
 def _draw(axes: Axes, groups: Groups, column: str, label: str, of: str = "all") -> None:
+    none = "no run succeeded" if of == "successful" else "no run switched"
     for (name, rows), colour in zip(groups, distinct_colours(len(groups)), strict=True):
         look = Look(color=colour, linewidth=1.3)
-        draw_shares(axes, rows[column], label=name, **look)
+        shown = name if rows[column].notna().any() else f"{name}: {none}"
+        draw_shares(axes, rows[column], label=shown, **look)
     axes.set(xlabel=label, ylabel=f"share of {of} runs / %", ylim=(0, 101))
     axes.set_xlim(left=0)
     if not any(rows[column].notna().any() for _, rows in groups):
-        told = "no run succeeded" if of == "successful" else "no run switched"
-        axes.text(0.5, 0.5, told, transform=axes.transAxes, ha="center", color=GREY)
+        axes.text(0.5, 0.5, none, transform=axes.transAxes, ha="center", color=GREY)
         axes.set_xticks([])
     tidy(axes)
 

@@ -14,6 +14,7 @@ from mapfilter._area_scale import check_scale
 from mapfilter._gdal import open_raster
 from mapfilter._parallel import Progress
 from mapfilter.check.band_law import check_bands
+from mapfilter.check.carrier_power import check_carrier_power
 from mapfilter.check.datum_shift import plan_by_datum
 from mapfilter.check.extent_checks import check_extents
 from mapfilter.check.fills import check_fills
@@ -204,6 +205,9 @@ class _Checks:
                             f"{note[:1].upper()}{note[1:]}.",
                             "warning",
                         )
+                of_eirp = self.config.rasters.path is None or self.config.rasters.quantity == "loss"
+                if surveyed_plan is None and of_eirp:
+                    check_carrier_power(plan, self.plan_name, self.findings)
                 return plan
         return None
 

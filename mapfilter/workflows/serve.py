@@ -13,6 +13,7 @@ import numpy as np
 from mapfilter._inputs import read_input
 from mapfilter._io import program_version
 from mapfilter._parallel import Progress
+from mapfilter._words import number_of
 from mapfilter.config.sections import Config
 from mapfilter.database.radioroutes import RadioRouteDatabase
 from mapfilter.database.store import open_database
@@ -136,7 +137,7 @@ def run_serve(
         service = Service(sessions, locate, limits, token, host_names, page)
         host, port = made.getsockname()[:2]
         shown = f"[{host}]" if ":" in host else host
-        restored = f"; {len(found)} saved sessions" if store is not None else ""
+        restored = f"; {number_of(len(found), 'saved session')}" if store is not None else ""
 
         def ready() -> None:
             at = f"http://{shown}:{port}"
@@ -145,7 +146,7 @@ def run_serve(
         ended = run(
             service, made, save_every_s=options.save_every_s, ready=ready, warn=print_message
         )
-    what = f"{ended.sessions} sessions "
+    what = f"{number_of(ended.sessions, 'session')} "
     if not ended.sessions:
         what = "no session was open"
     elif store is None:

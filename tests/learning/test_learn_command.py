@@ -166,7 +166,7 @@ def test_journeys_of_no_use_are_warned_of(faulty, monkeypatch):
     (finding,) = result.findings
     assert (finding.code, finding.severity, result.ok) == ("journeys-unused", "warning", True)
     assert finding.where == str(config.track_path)
-    assert finding.evidence == "J1, j2 not used: no motion."
+    assert finding.evidence == "j1, j2 not used: no motion."
 
 
 def test_a_cell_that_the_database_lacks_is_named(faulty, tmp_path):

@@ -257,3 +257,10 @@ def test_radius_of_a_mixture_is_where_its_share_lies_beyond(weights, thin, share
         low_m, high_m = (low_m, middle_m) if is_within else (middle_m, high_m)
     # The radius is taken too large by 1e-5 of it at most.
     assert high_m * (1 - 1e-6) <= tail.radius_m(1 - share) <= high_m * (1 + 1.2e-5)
+
+
+def test_a_tail_is_shown_in_a_line():
+    """The output of a step showed two arrays of hundreds of numbers."""
+    shown = repr(tail_of([1.0, 5.0, 9.0], [0.5, 0.25, 0.25], 1e-4))
+    assert shown.startswith("SampleTail(3 distances, scale ")
+    assert shown.endswith(" m, p_none 0.0001)")

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from mapfilter.errors import InputError
 from mapfilter.geodesy import project, unproject
+from mapfilter.radio.cell_places import ZONE_IN_FRONT
 from mapfilter.radio.cells import Cell, CellPlan
 from mapfilter.radio.plan_files import read_cell_plan, write_cell_plan
 
@@ -71,8 +72,8 @@ def test_east_and_north_are_taken_as_they_are_or_moved_from_their_own_crs(tmp_pa
     ("east", "north", "likely"),
     [
         (6672000, 385500, "east and north swapped"),
-        (35385500, 6672000, "eastings with the number of a zone in front, as of EPSG:4647"),
-        (3385500, 6672000, "eastings with the number of a zone in front, as of EPSG:4647"),
+        (35385500, 6672000, ZONE_IN_FRONT),
+        (3385500, 6672000, ZONE_IN_FRONT),
         (1264764, 21889763, "feet given for metres"),
         (9e6, 9.9e6, "another CRS"),
     ],

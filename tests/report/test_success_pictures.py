@@ -234,3 +234,11 @@ def test_a_filter_without_radii_is_named_as_such(tmp_path):
     for name, radius in (("some", curves), ("none", curves[1:])):
         save(plot_claimed_radii(radius, title="a town", axis="reading"), tmp_path / f"{name}.png")
         assert inked(tmp_path / f"{name}.png") > 0.005
+
+
+def test_a_group_without_a_curve_says_why_in_the_legend():
+    """Its name stood beside a line that is nowhere drawn."""
+    groups = [("good", runs(20)), ("bad", runs(20).assign(success=False))]
+    panels = plot_run_distributions(groups, title="a town").axes
+    names = [axes.get_legend_handles_labels()[1] for axes in panels]
+    assert names == [["good", "bad"], ["good", "bad: no run succeeded"], ["good", "bad"]]

@@ -261,6 +261,27 @@ def test_of_several_layers_of_points_the_one_with_times(tmp_path):
         read_recording(path)
 
 
+def test_of_several_layers_with_times_the_only_one_with_rows(tmp_path):
+    """Beside the empty layers of other days, as apps prepare them, it was refused."""
+    points = [shapely.Point(24.94, lat) for lat in LAT_DEG]
+    walk = geopandas.GeoDataFrame({"time": ISO, "rsrp": [-80.0] * 5}, geometry=points, crs=4326)
+    path = tmp_path / "drive.gpkg"
+    walk[:0].to_file(path, layer="monday", geometry_type="Point")
+    walk.to_file(path, layer="tuesday")
+    walk[:0].to_file(path, layer="wednesday", geometry_type="Point")
+    assert format_of(path) is not None
+    found = read_recording(path)
+    assert_placed(found, ["empty layers of points not read: monday, wednesday"])
+    walk.to_file(path, layer="thursday")
+    with pytest.raises(InputError, match="found tuesday, thursday"):
+        read_recording(path)
+    path.unlink()
+    walk[:0].to_file(path, layer="monday", geometry_type="Point")
+    walk[:0].to_file(path, layer="tuesday", geometry_type="Point")
+    with pytest.raises(InputError, match="found monday, tuesday"):
+        read_recording(path)
+
+
 def test_other_json_is_no_recording(tmp_path):
     wide = json.dumps({f"{at}": {"lat": 60.0, "lon": 24.0, "time": at} for at in range(20_000)})
     plain = '{"version": 2, "crs": "EPSG:3067"}'

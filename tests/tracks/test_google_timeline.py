@@ -119,7 +119,7 @@ def test_semantic_history_of_an_account(tmp_path):
     found = read(tmp_path, {"timelineObjects": [{"activitySegment": segment}, visit]})
     assert found.tables["positions"]["time_s"].tolist() == [START_S, START_S + 9]
     assert any("2 positions: ends of segments, as Google inferred" in one for one in found.notes)
-    with pytest.raises(InputError, match=r"positions or Wi-Fi with times, found 1 visit left out"):
+    with pytest.raises(InputError, match=r"Wi-Fi with times, found 1 visit \(Google's"):
         read(tmp_path, {"timelineObjects": [visit]})
     assert format_of(tmp_path / "Timeline.json") is None
 

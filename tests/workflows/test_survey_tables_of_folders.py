@@ -31,20 +31,20 @@ def read(*paths):
     return read_measurements(paths, "EPSG:32635", recorded=recorded_rows)
 
 
-def write(folder, name):
+def write(folder, name, table=TABLE):
     path = folder / name
     if path.suffix == ".json":
-        path.write_text(json.dumps(TABLE.to_dict("records")))
+        path.write_text(json.dumps(table.to_dict("records")))
     elif path.suffix == ".parquet":
-        TABLE.to_parquet(path)
+        table.to_parquet(path)
     elif path.suffix == ".gpkg":
-        points = shapely.points(TABLE["lon"], TABLE["lat"])
-        rest = TABLE.drop(columns=["lat", "lon"])
+        points = shapely.points(table["lon"], table["lat"])
+        rest = table.drop(columns=["lat", "lon"])
         geopandas.GeoDataFrame(rest, geometry=points, crs=4326).to_file(path)
     elif path.suffix == ".xlsx":
-        path.write_bytes(workbook([[*TABLE.columns], *TABLE.to_numpy().tolist()]))
+        path.write_bytes(workbook([[*table.columns], *table.to_numpy().tolist()]))
     else:
-        TABLE.to_csv(path, index=False)
+        table.to_csv(path, index=False)
     return path
 
 
@@ -70,3 +70,17 @@ def test_other_tables_of_a_folder_are_left_out_by_name(tmp_path):
     assert "4 files without a drive test left out: damaged.parquet, plan.xlsx" in found.notes[0]
     with pytest.raises(InputError, match="levels of cells, and positions, found"):
         read(tmp_path / "way.json")
+
+
+@pytest.mark.parametrize("name", ["a.json", "a.gpkg", "a.xlsx"])
+def test_a_drive_test_whose_dates_are_unclear_is_asked_about_in_a_folder_too(tmp_path, name):
+    """It was left out with a note, and its levels were missing in the map."""
+    write(tmp_path, "b.csv")
+    unclear = TABLE.assign(time=TABLE["time"].str.replace("2026-05-01T", "05/06/2026 ").str[:-1])
+    path = write(tmp_path, name, unclear)
+    for given in (path, tmp_path):
+        with pytest.raises(InputError, match=rf"{name} row 2, time: .*day or month first"):
+            read(given)
+    path.unlink()
+    write(tmp_path, name, unclear.drop(columns="rsrp"))
+    assert f"1 file without a drive test left out: {name}" in read(tmp_path).notes[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from mapfilter._types import Floats
+from mapfilter._types import Bools, Floats
 from mapfilter.geodesy import unproject
 from mapfilter.tracks.joining.position_units import METRES_PER_DEGREE, continuous_deg, near_deg
 from mapfilter.tracks.readers.recorded.recording import Recording
@@ -14,6 +14,9 @@ _MOST_POINTS = 400
 COMMON_SHARE = 0.5
 """Least share of a recording that another one has in common with it."""
 _FINE_S = 0.1
+_GAP_S = 30.0
+"""A silence longer than this, and than so many usual ones, is a gap: places in it are unknown."""
+_GAPS = 10.0
 
 TimedPlaces = tuple[Floats, Floats, Floats]
 """Seconds, longitudes that go on across 180 degrees, and latitudes."""
@@ -41,10 +44,13 @@ def _degrees(time_s: pd.Series, lon_deg: object, lat_deg: object) -> TimedPlaces
 
 
 def median_apart_m(one: TimedPlaces, other: TimedPlaces, shift_s: float, least: float) -> float:
-    """Return the median distance of a shifted track; NaN where little of it is in common."""
+    """Return the median distance of a shifted track; NaN where little of it is in common.
+
+    Moments in a gap of the first track do not count: nobody knows where it was.
+    """
     step = max(1, len(other[0]) // _MOST_POINTS)
     time = other[0][::step] + shift_s
-    inside = (time >= one[0][0]) & (time <= one[0][-1])
+    inside = (time >= one[0][0]) & (time <= one[0][-1]) & _known(one[0], time)
     if inside.sum() < 3 or inside.mean() < least:
         return float("nan")
     lon, lat = (degrees[::step][inside] for degrees in other[1:])
@@ -52,6 +58,15 @@ def median_apart_m(one: TimedPlaces, other: TimedPlaces, shift_s: float, least: 
     east = near_deg(np.interp(time[inside], one[0], one[1]) - lon, 0.0) * np.cos(np.radians(lat))
     north = np.interp(time[inside], one[0], one[2]) - lat
     return METRES_PER_DEGREE * float(np.median(np.hypot(east, north)))
+
+
+def _known(time_s: Floats, at_s: Floats) -> Bools:
+    """Return which moments lie in no gap of a track, such as that of a receiver that is jammed."""
+    after = np.searchsorted(time_s, at_s).clip(1, len(time_s) - 1)
+    silent_s = np.diff(time_s)
+    longest_s = max(_GAP_S, _GAPS * float(np.median(silent_s)))
+    on_a_row = (time_s[after] == at_s) | (time_s[after - 1] == at_s)
+    return on_a_row | (silent_s[after - 1] <= longest_s)
 
 
 def best_place_shift(one: TimedPlaces, other: TimedPlaces, shifts: Floats) -> tuple[float, float]:

@@ -32,7 +32,7 @@ from mapfilter.tracks.readers import (
     tems,
     wigle,
 )
-from mapfilter.tracks.readers.contained.opening import OF_TABLES, read_any
+from mapfilter.tracks.readers.contained.opening import OF_TABLES, is_of_levels, read_any
 from mapfilter.tracks.readers.format import Format, ReadOptions
 from mapfilter.tracks.readers.recorded.reading import Reading
 from mapfilter.tracks.readers.recorded.recording import Recording
@@ -112,6 +112,14 @@ def format_of(path: str | Path) -> Format | None:
     if found is None and (below := _below_title(text, None)) is not None:
         return find_format(below) or plain_csv.FORMAT
     return found
+
+
+def has_levels(path: Path) -> bool:
+    """Return whether the columns of a table in another file are those of placed levels."""
+    try:
+        return is_of_levels(read_any(path, _is_known, _PEEKED_BYTES))
+    except InputError:
+        return False
 
 
 def read_recording(

@@ -6,6 +6,15 @@
   const rows = (object) => Object.fromEntries(Object.entries(object ?? {}).map(([key, value]) =>
     [key, MF.isArray(value) ? MF.array(value) : value]));
 
+  const [PAUSE_S, PAUSES] = [30, 10];
+  // A pause between two epochs is longer than this, as in mapfilter.evaluation.outcome.
+  const pauseOf = (time, count) => {
+    const steps = Array.from({ length: Math.max(count - 1, 0) }, (_, i) => time[i + 1] - time[i]).sort((a, b) => a - b);
+    const half = steps.length >> 1;
+    const usual = steps.length ? (steps.length % 2 ? steps[half] : (steps[half - 1] + steps[half]) / 2) : 0;
+    return Math.max(PAUSE_S, PAUSES * usual);
+  };
+
   // The last explained report at or before an epoch; -1 where there is none.
   MF.lastReport = (run, i) => {
     if (!run.reports.length || run.reportEpochs[0] > i) return -1;
@@ -24,6 +33,13 @@
 
     run.at = (time) => MF.lastAt(epochs.time, time, count);
     run.status = (i) => bundle.statuses[epochs.status[i]] ?? "?";
+    run.pause = pauseOf(epochs.time, count);
+    run.isSilentAfter = (i) => i + 1 < count && epochs.time[i + 1] - epochs.time[i] > run.pause;
+    // Within a pause the status of the epoch before says nothing.
+    run.statusAt = (time) => {
+      const i = run.at(time);
+      return time > epochs.time[i] && run.isSilentAfter(i) ? "NO DATA" : run.status(i);
+    };
     run.place = (i) => ({ east: epochs.east[i], north: epochs.north[i] });
     run.hasTruth = Boolean(run.truth && run.truth.time.length);
     run.readingsOf = (i) => {

@@ -91,6 +91,9 @@
 
     run.at = (time) => MF.lastAt(epochs.time, time, run.count);
     run.status = (i) => bundle.statuses[epochs.status[i]] ?? "waiting";
+    run.pause = Infinity;
+    run.isSilentAfter = () => false;
+    run.statusAt = (time) => run.status(run.at(time));
     run.place = (i) => ({ east: epochs.east[i], north: epochs.north[i] });
     run.readingsOf = (i) => rows[i] ?? [];
     run.unusedOf = (i) => unused[i] ?? [];

@@ -64,9 +64,11 @@
       const point = [camera.x(east[i], view), camera.y(north[i], view)];
       // A leap of the estimate is no movement: the line is cut.
       const leap = last !== null && Math.hypot(east[i] - east[i - 1], north[i] - north[i - 1]) > LEAP_M * Math.max(time[i] - time[i - 1], 1);
-      if (status[i] !== code || leap) {
+      // Where it was in a pause is not known.
+      const cut = leap || (last !== null && run.isSilentAfter(i - 1));
+      if (status[i] !== code || cut) {
         flush();
-        points = leap || !points.length ? [] : [points[points.length - 1]];
+        points = cut || !points.length ? [] : [points[points.length - 1]];
         code = status[i];
         last = null;
       }

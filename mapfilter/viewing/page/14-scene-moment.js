@@ -27,7 +27,7 @@
     return marks;
   };
 
-  MF.drawMoment = (pen, { ground, run, i, density, place, show }) => {
+  MF.drawMoment = (pen, { ground, run, i, status: name, density, place, show }) => {
     const { camera, view } = pen;
     const { color } = MF;
     const at = (one) => [camera.x(one.east, view), camera.y(one.north, view)];
@@ -50,7 +50,7 @@
     }
     if (known(here)) {
       const [x, y] = at(here);
-      const status = MF.statusColor(run.status(i));
+      const status = MF.statusColor(name);
       if (show.regions) {
         if (Number.isFinite(e.protection?.[i])) pen.circle(x, y, e.protection[i] * camera.scale, { stroke: color.ink, width: 1.2, dash: [2, 5], alpha: 0.7 });
         if (Number.isFinite(e.r95?.[i])) pen.circle(x, y, e.r95[i] * camera.scale, { stroke: status, width: 1.8 });

@@ -82,7 +82,7 @@
       const { time, place, show } = store.state;
       if (run && run.count) {
         const i = run.at(time);
-        MF.drawMoment(pen, { ground, run, i, density: show.belief ? density(run, run.frameAt(i)) : null, place, show });
+        MF.drawMoment(pen, { ground, run, i, status: run.statusAt(time), density: show.belief ? density(run, run.frameAt(i)) : null, place, show });
       } else if (place) MF.drawPlace(pen, place, "");
       MF.drawScaleBar(pen);
     };
@@ -95,7 +95,7 @@
       context.clearRect(0, 0, map.view.width, map.view.height);
       paintMoving(MF.canvasPen(context, camera, map.view));
       if (run && pill) {
-        const status = run.status(run.at(store.state.time));
+        const status = run.statusAt(store.state.time);
         pill.textContent = status.toLowerCase();
         pill.style.setProperty("--dot", MF.statusColor(status));
       }

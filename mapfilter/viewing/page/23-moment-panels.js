@@ -3,12 +3,12 @@
 (() => {
   // A panel is built anew only where its epoch has changed.
   const once = (build) => {
-    let last = [null, -1];
-    return (run, i) => {
+    let last = [null, -1, ""];
+    return (run, i, status) => {
       const key = run.momentKey(i);
-      if (last[0] === run && last[1] === key) return;
-      last = [run, key];
-      build(run, i);
+      if (last[0] === run && last[1] === key && last[2] === status) return;
+      last = [run, key, status];
+      build(run, i, status);
     };
   };
   const pair = (name, value, extra = null) => MF.h("div", {}, MF.h("dt", {}, name), MF.h("dd", {}, value, extra ? MF.h("small", {}, ` ${extra}`) : null));
@@ -20,15 +20,15 @@
     const name = MF.h("p", { class: "quiet", hidden: page.runs.length < 2 });
     const element = MF.h("section", { class: "card moment", "aria-labelledby": "moment-title" },
       MF.h("header", {}, MF.h("h2", { id: "moment-title" }, "This moment"), pill), name, where, list);
-    element.refresh = once((run, i) => {
+    element.refresh = once((run, i, status) => {
       const e = run.epochs;
-      const status = run.status(i);
       pill.textContent = status.toLowerCase();
       pill.style.setProperty("--dot", MF.statusColor(status));
       name.textContent = run.name;
       const here = run.place(i);
       const spot = Number.isFinite(here.east) ? page.ground.lonLat(here.east, here.north) : null;
-      where.textContent = spot ? MF.degrees(spot.lat, spot.lon) : "no position yet";
+      const since = status === "NO DATA" ? ` (last position, at ${page.clock(e.time[i])})` : "";
+      where.textContent = spot ? `${MF.degrees(spot.lat, spot.lon)}${since}` : "no position yet";
       const way = e.way?.[i] ? page.bundle.background?.ways?.[e.way[i] - 1] : null;
       const items = [
         ["50 % radius", MF.metres(e.r50?.[i])],

@@ -56,7 +56,13 @@
     // uPlot draws gaps at null; infinite values would spoil a scale.
     const columns = () => {
       plotted = [times[0], times[times.length - 1]];
-      return [Array.from(times), ...series.map((one) => Array.from(one.values, (value) => (Number.isFinite(value) ? value : null)))];
+      const { pause } = page.active();
+      const made = [Array.from(times), ...series.map((one) => Array.from(one.values, (value) => (Number.isFinite(value) ? value : null)))];
+      // A line across a pause would be an invention.
+      for (let i = times.length - 1; i > 0; i -= 1) {
+        if (times[i] - times[i - 1] > pause) made.forEach((column, n) => column.splice(i, 0, n ? null : times[i - 1] + 1e-3));
+      }
+      return made;
     };
     const build = () => {
       plot?.destroy();

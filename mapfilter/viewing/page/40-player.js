@@ -21,10 +21,10 @@
     strip.height = 8;
     const context = strip.getContext("2d");
     for (let x = 0; x < width; x += 1) {
-      const status = run.status(run.at(page.start + ((page.end - page.start) * x) / width));
+      const status = run.statusAt(page.start + ((page.end - page.start) * x) / width);
       context.fillStyle = MF.statusColor(status);
-      // Uncertain and lost are told by their height too.
-      const top = status === "LOST" || status === "OUTSIDE" ? 4 : status === "UNCERTAIN" ? 2 : 0;
+      // Uncertain and lost are told by their height too; a pause without an epoch is a thin line.
+      const top = status === "NO DATA" ? 7 : status === "LOST" || status === "OUTSIDE" ? 4 : status === "UNCERTAIN" ? 2 : 0;
       context.fillRect(x, top, 1, 8 - top);
     }
   };
@@ -57,12 +57,11 @@
     const refresh = () => {
       const { time, playing } = store.state;
       const run = page.active();
-      const i = run.at(time);
       if (page.live) { slider.min = page.start; slider.max = page.end; }
       slider.value = time;
       follow?.setAttribute("aria-pressed", String(store.state.follow));
       const since = time - page.start;
-      slider.setAttribute("aria-valuetext", `${MF.clock(since)} of ${MF.clock(page.end - page.start)}, ${run.status(i).toLowerCase()}`);
+      slider.setAttribute("aria-valuetext", `${MF.clock(since)} of ${MF.clock(page.end - page.start)}, ${run.statusAt(time).toLowerCase()}`);
       const utc = Number.isFinite(run.data.start_utc_s ?? NaN) ? ` · ${new Date(Math.round(1000 * (run.data.start_utc_s + time))).toISOString().slice(11, 19)} UTC` : "";
       clock.replaceChildren(`${MF.clock(since)} `, MF.h("small", {}, `/ ${MF.clock(page.end - page.start)}${utc}`));
       if (drawn !== playing) {

@@ -18,7 +18,7 @@
   const caption = (page, pen, map) => {
     const { state } = page.store;
     const run = map.run;
-    const words = run ? `${run.name} · ${MF.clock(state.time - page.start)} · ${run.status(run.at(state.time)).toLowerCase()}` : page.bundle.title;
+    const words = run ? `${run.name} · ${MF.clock(state.time - page.start)} · ${run.statusAt(state.time).toLowerCase()}` : page.bundle.title;
     pen.text(words, 12, 18, { fill: MF.color.ink, halo: MF.color.halo, size: 14, weight: 650 });
     pen.text(page.bundle.attribution ?? "", 12, map.view.height - 12, { fill: MF.color.soft, halo: MF.color.halo, size: 10 });
   };

@@ -78,7 +78,7 @@
   const announce = (page, before) => {
     const run = page.active();
     const i = run.at(page.store.state.time);
-    const status = run.status(i);
+    const status = run.statusAt(page.store.state.time);
     if (status !== before) MF.say(`${page.clock(page.store.state.time)}: ${status.toLowerCase()}, 95 % radius ${MF.metres(run.epochs.r95?.[i])}`);
     return status;
   };
@@ -121,7 +121,7 @@
     charts?.build();
     player?.strip();
 
-    let status = replay ? page.active().status(page.active().at(page.store.state.time)) : "";
+    let status = replay ? page.active().statusAt(page.store.state.time) : "";
     let sideAt = 0;
     let sideStale = true;
     const refreshSide = () => {
@@ -129,8 +129,9 @@
       sideAt = performance.now();
       if (!replay) { database.refresh(); return; }
       const run = page.active();
-      const i = run.at(page.store.state.time);
-      for (const panel of panels) panel.refresh(run, i);
+      const { time } = page.store.state;
+      const i = run.at(time);
+      for (const panel of panels) panel.refresh(run, i, run.statusAt(time));
       charts.refresh(page.store.state.time);
       status = announce(page, status);
       if (!live && !page.store.state.playing) MF.writeAddress(page);

@@ -34,8 +34,8 @@ def run_check_suspects(config: Config, progress: Progress | None = None) -> Chec
         evidence = f"It serves in {one.journeys} journeys."
         findings.add("journeys-unlisted-cell", f"cell {one.cell}", evidence, "warning")
     for note in taught.unused:
-        evidence = f"{note[:1].upper()}{note[1:]}."
-        findings.add("journeys-unused", str(config.track_path), evidence, "warning")
+        # It begins with the name of a log.
+        findings.add("journeys-unused", str(config.track_path), f"{note}.", "warning")
     return findings.result()
 
 

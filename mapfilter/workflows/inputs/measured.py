@@ -17,7 +17,7 @@ from mapfilter.tracks.checks.placeless import LOCAL_FRAME, LOCAL_FRAME_HINT, is_
 from mapfilter.tracks.log_folders import is_log
 from mapfilter.tracks.readers.contained.opening import OF_TABLES
 from mapfilter.tracks.readers.format import ReadOptions
-from mapfilter.tracks.readers.formats import format_named, format_of, read_recording
+from mapfilter.tracks.readers.formats import format_named, format_of, has_levels, read_recording
 from mapfilter.tracks.schema import SERVING, TABLES
 from mapfilter.tracks.store import read_log
 
@@ -39,8 +39,8 @@ def recorded_rows(path: Path) -> Rows | None:
     Raises
     ------
     InputError
-        The recording holds no usable row, or lacks positions or cells. NotMeasurementsError where
-        it lacks cells and is no plain CSV.
+        The recording holds no usable row, or lacks positions or cells, or its dates may be read in
+        two ways. NotMeasurementsError where it lacks cells and is no plain CSV.
     """
     if is_log(path):
         return _log_rows(path)
@@ -52,8 +52,11 @@ def recorded_rows(path: Path) -> Rows | None:
     try:
         recording = read_recording(path, options=ReadOptions())
     except InputError as error:
-        # JSON, workbooks and layers may be of anything.
-        raise (NotMeasurementsError(error.faults) if in_table else error) from error
+        # JSON, workbooks and layers may be of anything. A person can tell which date was meant.
+        unclear = any(fault.where.endswith(", time") for fault in error.faults)
+        if in_table and not (unclear and has_levels(path)):
+            raise NotMeasurementsError(error.faults) from error
+        raise
     known = known or format_named(recording.format)
     tables = recording.tables
     lacking = [name for name in ("radio", "positions") if name not in tables]

@@ -54,6 +54,7 @@ def planned_cells(config: Config, crs: str, area: Lattice | None = None) -> Cell
         columns=cells.columns.given,
         defaults={name: getattr(cells, name) for name in _DEFAULTS if not own or name in stated},
         bounds_m=bounds_m,
+        plan_crs=cells.crs,
     )
 
 

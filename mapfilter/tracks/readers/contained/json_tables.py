@@ -133,7 +133,9 @@ def _records(content: str, path: Path) -> tuple[list[Any], list[str]]:
         google, told = timeline_records(objects[0])
         if told and not google:
             hint = "switch on the timeline of the phone, and export it, or take another logger"
-            got = "; ".join(told)
+            *left, no_cells = told
+            some = ", ".join(one.removesuffix(" left out") for one in left) or "none"
+            got = f"{some} ({no_cells})"
             raise fail(InputError, str(path), "positions or Wi-Fi with times", got, hint)
         if google:
             return google, [*notes, *told]

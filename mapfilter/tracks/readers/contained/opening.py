@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
 from mapfilter._inputs import open_input
@@ -108,10 +108,21 @@ def _table_in(text: Text, is_known: Callable[[Text], bool], own: Collection[str]
     return with_point_columns(text)
 
 
+def is_of_levels(table: Text) -> bool:
+    """Return whether the columns of a table as CSV are those of placed levels."""
+    _, fields = _columns(table)
+    return {"lat_deg", "lon_deg", "level_dbm"} <= fields
+
+
+def _columns(table: Text) -> tuple[Sequence[str], set[str]]:
+    """Return the names of the columns of a table as CSV, and the fields that they hold."""
+    names = full_names(header_names(table.first_line, ","))
+    return names, {*usual_fields(names), *stated_fields(names, (), ())}
+
+
 def _is_of_a_journey(table: Text, own: Collection[str]) -> bool:
     """Return whether a table has places or cells; other JSON is of settings, or of figures."""
-    names = full_names(header_names(table.first_line, ","))
-    fields = {*usual_fields(names), *stated_fields(names, (), ())}
+    names, fields = _columns(table)
     named = any(name.lower() in names for name in own)
     return named or has_content(names) or {"lat_deg", "lon_deg"} <= fields or bool(_CELLS & fields)
 

@@ -41,8 +41,8 @@ def sheet_of(path: Path) -> Text:
 def layer_of(path: Path, most_rows: int = -1, own: Collection[str] = ()) -> Text:
     """Return the points of a GeoPackage's layer, with longitude and latitude, as a text of CSV.
 
-    ``most_rows`` are read at most, all of them where it is negative. Of several layers of points it
-    is the only one with the columns ``own``, or else with times.
+    ``most_rows`` are read at most, all of them where it is negative. Of several layers of points
+    that are not empty it is the only one with the columns ``own``, or else with times.
 
     Raises
     ------
@@ -61,7 +61,10 @@ def layer_of(path: Path, most_rows: int = -1, own: Collection[str] = ()) -> Text
                 if kind is not None and "Point" in str(kind)
             ]
             held = {one: _columns(source.path, one) for one in layers}
-            layer, notes = _journey_of(path, held, own)
+            filled = {one: names for one, (names, rows) in held.items() if rows}
+            layer, notes = _journey_of(path, filled or {one: held[one][0] for one in held}, own)
+            if filled and (empty := [one for one in held if one not in filled]):
+                notes += (f"empty layers of points not read: {listed(empty)}",)
             # A layer may be a view without an end.
             few = most_rows if most_rows >= 0 else _MOST_ROWS + 1
             frame: Any = pyogrio.read_dataframe(source.path, layer=layer, max_features=few)
@@ -82,9 +85,10 @@ def layer_of(path: Path, most_rows: int = -1, own: Collection[str] = ()) -> Text
     return as_table(Text(path, b"", notes), names, (list(row) for row in rows), f"layer {layer}")
 
 
-def _columns(source: Path | str, layer: str) -> list[str]:
+def _columns(source: Path | str, layer: str) -> tuple[list[str], int]:
+    """Return the names of a layer's columns, and 1 where it has a row."""
     few: Any = pyogrio.read_dataframe(source, layer=layer, max_features=1, read_geometry=False)
-    return [str(name).lower() for name in few.columns]
+    return [str(name).lower() for name in few.columns], len(few)
 
 
 def _journey_of(
