@@ -133,7 +133,8 @@ FAULTS = (
     f"Where a jump is less than {number(HOLDS.around_deg)}°",
     f"more than {number(degrees(bends._BENT_RAD))}° from the direction of the last metres (a mean "
     f"that falls off by 1/e in {number(bends._MEMORY_M)} m, of {number(bends._LEAST_M)} m or more)",
-    f"after {number(held._BEND_M)} m, or at a Bayes factor of {e_to(held._BEND_NATS)}, unless",
+    f"after {number(held._BEND_M)} m, unless something speaks for it (a Bayes factor of "
+    f"{e_to(held.SPEAKS_NATS)} or more), and at one of {e_to(held._BEND_NATS)}.",
     f"odds that a jump is the phone's are {HOLDS.probability:g} to 1",
     f"turn it back with {WORDS[HOLDS.back_odds]} times these odds",
     f"From {e_to(HOLDS.lost_log_odds)} on (a probability of 0.27), with a position more than 50 m "

@@ -88,12 +88,12 @@ def test_the_belief_beside_reads_turns_the_other_way():
 @pytest.mark.parametrize(
     ("nats", "gone_m", "stays", "beside_next"),
     [
-        (0.0, 99.0, True, False),
-        (0.0, 100.0, False, False),
+        (0.0, 199.0, True, False),
+        (0.0, 200.0, False, False),
         # Something speaks for it.
-        (1.0, 399.0, True, True),
-        (1.0, 400.0, False, True),
-        (0.9, 100.0, False, False),
+        (0.3, 399.0, True, True),
+        (0.3, 400.0, False, True),
+        (0.2, 200.0, False, False),
         (-1.9, 10.0, True, False),
         (-2.0, 10.0, False, False),
     ],

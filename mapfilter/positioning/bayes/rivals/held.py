@@ -31,9 +31,9 @@ from mapfilter.positioning.bayes.rivals.alternative import NullHypothesis
 from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules, RivalRules
 
-SPEAKS_NATS = 1.0
+SPEAKS_NATS = 0.3
 """Log Bayes factor from which on something speaks for a rival that began at a bend."""
-_BEND_M, _BEND_NATS = 100.0, -2.0
+_BEND_M, _BEND_NATS = 200.0, -2.0
 """Distance after which one that nothing speaks for is given up, and log Bayes factor at which it is
 refuted: bends are many, and to either side of one beliefs come apart soon."""
 
