@@ -23,6 +23,7 @@ from mapfilter.positioning.bayes.beliefs.legs import Lead, Leg
 from mapfilter.positioning.bayes.beliefs.path import DeadReckoning, RecentPath
 from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, NullHypothesis
+from mapfilter.positioning.bayes.rivals.bends import Straight
 from mapfilter.positioning.bayes.rivals.half_turns import HalfTurns
 from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
 from mapfilter.positioning.bayes.rivals.hold import Hold
@@ -91,6 +92,7 @@ _CLASSES: dict[str, type] = {
         SensorWatch,
         ShortSteps,
         StepOutput,
+        Straight,
         TimingState,
         TrailFix,
         UndirectedWay,

@@ -36,7 +36,7 @@ def test_the_direction_of_the_last_metres():
 def test_after_less_than_eight_metres_there_is_none():
     assert isnan(walked(*[0.0] * 7).heading_rad)
     assert not isnan(walked(*[0.0] * 8).heading_rad)
-    assert not walked(*[0.0] * 7).bends(MotionStep(1.0, 3.0))
+    assert not walked(*[0.0] * 7).bends(MotionStep(1.0, 3.0), HoldRules())
 
 
 @pytest.mark.parametrize(
@@ -53,14 +53,21 @@ def test_after_less_than_eight_metres_there_is_none():
     ],
 )
 def test_where_a_way_bends(step, bends):
-    assert walked(*[0.0] * 20).bends(step) is bends
+    assert walked(*[0.0] * 20).bends(step, HoldRules()) is bends
+
+
+def test_from_where_on_it_does_and_where_nobody_watches():
+    step, straight = MotionStep(1.0, radians(40.0)), walked(*[0.0] * 20)
+    assert straight.bends(step, HoldRules(bend_deg=39.0))
+    assert not straight.bends(step, HoldRules(bend_deg=41.0))
+    assert not straight.bends(step, HoldRules(watched=False))
 
 
 def test_across_the_west_too():
     west = walked(*[170.0, -170.0] * 10)
     assert abs(west.heading_rad) > radians(175.0)
-    assert not west.bends(MotionStep(1.0, radians(-160.0)))
-    assert west.bends(MotionStep(1.0, radians(-120.0)))
+    assert not west.bends(MotionStep(1.0, radians(-160.0)), HoldRules())
+    assert west.bends(MotionStep(1.0, radians(-120.0)), HoldRules())
 
 
 @pytest.mark.parametrize("step", [MotionStep(0.0, 1.0), MotionStep(nan, 1.0), MotionStep(1.0, nan)])

@@ -109,9 +109,9 @@ def test_a_turned_phone_is_noticed_and_its_headings_are_read_otherwise(change):
 
 
 def test_walks_whose_headings_do_not_jump_are_the_same_to_the_bit():
-    """The town's corners, of 90° between rows short enough, are below the least jump."""
+    """The town's corners, of 90° between rows short enough, are below the least jump and bend."""
     log = log_of(3)
-    watched = replace(WATCHED, holds=replace(WATCHED.holds, jump_deg=140.0))
+    watched = replace(WATCHED, holds=replace(WATCHED.holds, jump_deg=140.0, bend_deg=140.0))
     rows, state = rows_of(watched, log, *begun_walk(watched, log, 3))
     assert state.belief.state.tobytes() == followed(False, 3)[-1].belief.state.tobytes()
     assert not any(row[3] for row in rows)

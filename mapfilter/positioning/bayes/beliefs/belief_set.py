@@ -171,7 +171,7 @@ class BeliefSet:
         main = self.main
         tracked = main is not None and state.status is main.status is Status.TRACKING
         rules, white_rad = filters.holds, filters.model.motion.white_rad
-        if not (rules.watched and tracked and isinstance(main, ParticleBelief)):
+        if not (tracked and isinstance(main, ParticleBelief)):
             return self
         by = rules, main, state.null, state.hold, straight_rad, travelled_m, white_rad
         beside = (*without_earlier(self.held, main), mirrored_before(*by, own.forking))

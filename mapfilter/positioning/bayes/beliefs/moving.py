@@ -224,7 +224,7 @@ class _Move:
             known = self.filters, self.state, jump_rad, gone_m, self.own
             self.beliefs = self.beliefs.at_jump(*known, positioned=self.positioned)
             self.straight = NO_DIRECTION
-        elif self.compass and not self.ranged and self.straight.bends(row):
+        elif self.compass and not self.ranged and self.straight.bends(row, self.filters.holds):
             self.finish_leg()
             before_rad, gone_m = self.straight.heading_rad, self.reckoning.travelled_m
             self.beliefs = self.beliefs.at_bend(

@@ -27,8 +27,6 @@ _MEMORY_M = 12.0
 """Way after which a heading counts 1/e of the last one."""
 _LEAST_M = 8.0
 """Way of which the direction before is that, at least."""
-_BENT_RAD = radians(35.0)
-"""Difference from which on beliefs to either side come apart, beyond the errors of headings."""
 
 
 class Straight(NamedTuple):
@@ -51,17 +49,19 @@ class Straight(NamedTuple):
         """That direction; NaN before some metres."""
         return atan2(self.north_m, self.east_m) if self.way_m >= _LEAST_M else nan
 
-    def bends(self, step: MotionStep) -> bool:
+    def bends(self, step: MotionStep, rules: HoldRules) -> bool:
         """Return whether a step leads far from that direction.
 
         Examples
         --------
-        >>> straight = Straight(9.0, 0.0, 9.0)
-        >>> straight.bends(MotionStep(1.0, 0.5)), straight.bends(MotionStep(1.0, 0.7))
+        >>> straight, rules = Straight(9.0, 0.0, 9.0), HoldRules(bend_deg=35.0)
+        >>> straight.bends(MotionStep(1.0, 0.5), rules), straight.bends(MotionStep(1.0, 0.7), rules)
         (False, True)
         """
         apart_rad = step.heading_rad - self.heading_rad
-        return step.step_m > 0 and isfinite(apart_rad) and abs(wrap_one_rad(apart_rad)) > _BENT_RAD
+        if not (rules.watched and step.step_m > 0 and isfinite(apart_rad)):
+            return False
+        return abs(wrap_one_rad(apart_rad)) > radians(rules.bend_deg)
 
     def after(self, step: MotionStep) -> Straight:
         """Return it with a step; one without a direction changes nothing."""

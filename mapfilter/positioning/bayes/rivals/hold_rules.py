@@ -64,6 +64,9 @@ class HoldRules(RivalRules):
         Change of the heading from one row of a walk to the next that may be the phone's.
     around_deg : float
         Change from which on it is one right round, which is rare in walks.
+    bend_deg : float
+        Difference of a heading from the direction of the last metres that is a bend, at which a
+        phone may turn out to have been mirrored.
     longest_row_m : float
         Longer rows may hold a corner, so their changes are no jumps.
     longest_pause_s : float
@@ -80,6 +83,7 @@ class HoldRules(RivalRules):
 
     jump_deg: Positive = 60.0
     around_deg: Positive = 150.0
+    bend_deg: Positive = 35.0
     longest_row_m: Positive = 3.0
     longest_pause_s: Positive = 3.0
     around_probability: Probability = 0.25
