@@ -64,8 +64,8 @@ def test_the_usual_rules_of_phones_that_are_turned_and_of_mirrored_paths():
     assert asdict(HoldRules()) == {
         "watched": True, "jump_deg": 60.0, "around_deg": 150.0, "bend_deg": 35.0,
         "longest_row_m": 3.0, "longest_pause_s": 3.0, "probability": 0.006,
-        "around_probability": 0.25, "back_odds": 4.0, "mirrored_odds": 0.25, "lost_log_odds": -1.0, "lost_after_m": 7.0,
-        "win_log_odds": 8.0,
+        "around_probability": 0.25, "back_odds": 4.0, "mirrored_odds": 0.25,
+        "lost_log_odds": -1.0, "lost_after_m": 7.0, "win_log_odds": 8.0,
         "abandon_threshold": -4.0, "abandon_after_m": 400.0, "abandon_ahead_after_m": 1200.0,
         "max_beliefs": 6, "particles": 1000,
     }  # fmt: skip
