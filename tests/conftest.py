@@ -122,8 +122,8 @@ def few_single_reports() -> Iterator[None]:
     from mapfilter.workflows.replays import baseline as replay_baseline
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(replay_baseline, "MOST_REPORTS", 20)
-        patch.setattr(replay_baseline, "CALIBRATED_WITH", 40)
+        patch.setattr(replay_baseline, "MOST_REPORTS", 8)
+        patch.setattr(replay_baseline, "CALIBRATED_WITH", 16)
         yield
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -48,12 +48,24 @@ def correlated_field(
     InputError
         A parameter is negative or not finite, or the torus would take more than 8 GiB.
     """
+    return _drawer(lattice, deviation_db, correlation_m)(rng)
+
+
+def _drawer(
+    lattice: Lattice, deviation_db: float, correlation_m: float
+) -> Callable[[np.random.Generator], Floats32]:
+    """Return :func:`correlated_field` as a function of the generator: fields share their spectrum.
+
+    Raises
+    ------
+    InputError
+    """
     _check(deviation_db, correlation_m)
+    size = lattice.rows, lattice.cols
     if deviation_db == 0:
-        return np.zeros((lattice.rows, lattice.cols), dtype=np.float32)
+        return lambda _: np.zeros(size, dtype=np.float32)
     if correlation_m == 0:
-        white = deviation_db * rng.standard_normal((lattice.rows, lattice.cols))
-        return np.asarray(white, dtype=np.float32)
+        return lambda rng: np.asarray(deviation_db * rng.standard_normal(size), dtype=np.float32)
     length_px = correlation_m / lattice.resolution_m
     pad = int(np.ceil(_PAD_LENGTHS * length_px))
     if (lattice.rows + pad) * (lattice.cols + pad) > _LARGEST_TORUS_PX:
@@ -64,11 +76,14 @@ def correlated_field(
         raise fail(InputError, "shadowing, correlation_m", expected, got, hint)
     from scipy import fft
 
-    shape = tuple(fft.next_fast_len(n + pad, real=True) for n in (lattice.rows, lattice.cols))
+    shape = tuple(fft.next_fast_len(n + pad, real=True) for n in size)
     amplitude = _spectral_amplitude(shape, length_px)
-    field = fft.irfft2(amplitude * fft.rfft2(rng.standard_normal(shape)), s=shape)
-    cut = field[: lattice.rows, : lattice.cols]
-    return np.asarray(deviation_db * cut, dtype=np.float32)
+
+    def drawn(rng: np.random.Generator) -> Floats32:
+        field = fft.irfft2(amplitude * fft.rfft2(rng.standard_normal(shape)), s=shape)
+        return np.asarray(deviation_db * field[: size[0], : size[1]], dtype=np.float32)
+
+    return drawn
 
 
 def site_shadowing(
@@ -104,14 +119,16 @@ def site_shadowing(
         Cell id and field in dB, in the plan's order.
     """
     _check(deviation_db, correlation_m, site_share, seed)
+    if not plan.cells:
+        return
+    drawn = _drawer(lattice, deviation_db, correlation_m)
     waiting = Counter(cell.site for cell in plan.cells)
     sites: dict[str, Floats32] = {}
     for cell in plan.cells:
         if cell.site not in sites:
             rng = named_rng(seed, stream, "site", cell.site)
-            sites[cell.site] = correlated_field(lattice, deviation_db, correlation_m, rng)
-        rng = named_rng(seed, stream, "cell", cell.id)
-        own = correlated_field(lattice, deviation_db, correlation_m, rng)
+            sites[cell.site] = drawn(rng)
+        own = drawn(named_rng(seed, stream, "cell", cell.id))
         waiting[cell.site] -= 1
         shared = sites[cell.site] if waiting[cell.site] else sites.pop(cell.site)
         field = np.sqrt(site_share) * shared + np.sqrt(1.0 - site_share) * own

@@ -15,7 +15,8 @@ BINS = Bins(0.0, 0.0, 25.0, 40, 30)
 def say(*points, bins=BINS):
     """BeliefSummary of (east, north, weight, more of the state...), by either way the same."""
     table = np.array([[east, north, *more] for east, north, _, *more in points]).T
-    state, weight = table.astype("f4"), np.array([p[2] for p in points], "f4")
+    # Rows lie apart in memory as those of a filter: kernels are compiled anew for others.
+    state, weight = np.ascontiguousarray(table, "f4"), np.array([p[2] for p in points], "f4")
     said = summarise(state, weight, bins)
     for one, other in zip(said, summarise_arrays(state, weight, bins), strict=True):
         np.testing.assert_allclose(other, one, rtol=1e-5, atol=1e-4)

@@ -19,6 +19,7 @@ from mapfilter.learning.patch import Change, Patch, read_patch, write_patch
 from mapfilter.workflows.learn import run_accept
 
 SHA = "0" * 64
+NAMES = st.text(min_size=1, max_size=8).filter(lambda t: t == t.strip() and t.isprintable())
 NUMBER = st.floats(-1e6, 1e6).map(lambda value: round(value, 2))
 
 
@@ -42,11 +43,10 @@ def difference_db(database, other, cell):
 @st.composite
 def changes(draw):
     kind = draw(st.sampled_from(["offset", "dead", "moved", "turned", "swapped", "way"]))
-    names = st.text(min_size=1, max_size=8).filter(lambda t: t == t.strip() and t.isprintable())
     count = {"swapped": 2, "way": 0}.get(kind, 1)
     made = Change(
         kind,
-        tuple(draw(st.lists(names, min_size=count, max_size=count, unique=True))),
+        tuple(draw(st.lists(NAMES, min_size=count, max_size=count, unique=True))),
         log_bayes_factor=draw(NUMBER),
         probability=round(draw(st.floats(0, 1)), 6),
         journeys=draw(st.integers(0, 99)),

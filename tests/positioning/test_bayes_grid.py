@@ -107,7 +107,7 @@ def test_the_error_falls_with_the_root_of_the_number(area, log):
 
     def error(count):
         some = positioner(area, grid=False, count=count)
-        found = [beliefs(some, log, FINE_M, seed, count=10)[-1] for seed in range(80)]
+        found = [beliefs(some, log, FINE_M, seed, count=10)[-1] for seed in range(40)]
         return np.mean([variation(one, reference) for one in found])
 
     assert error(1000) / error(4000) == pytest.approx(2.0, rel=0.1)

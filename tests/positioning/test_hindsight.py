@@ -36,7 +36,8 @@ MOVED = [
 
 def cloud(*rows):
     """States of (east, north, bias, log scale)."""
-    return np.array([[*row, 0.0] for row in rows], dtype=np.float32).T
+    # Rows lie apart in memory as those of a filter: kernels are compiled anew for others.
+    return np.ascontiguousarray(np.array([[*row, 0.0] for row in rows], dtype=np.float32).T)
 
 
 def kept(epoch, state, weight=None):

@@ -1,6 +1,8 @@
 """Protection levels against integrals of scipy, closed forms and known distributions."""
 
-from math import inf, isnan, log, pi, sqrt
+from copy import deepcopy
+from functools import cache
+from math import atan2, cos, exp, inf, isnan, log, pi, sin, sqrt
 
 import numpy as np
 import pytest
@@ -24,11 +26,19 @@ MODERATE = [
 
 
 def beyond_by_quadrature(radius, mean, covariance):
-    """Integrate the density in polar coordinates."""
-    found = stats.multivariate_normal(mean, covariance)
+    """Integrate the density in polar coordinates.
+
+    SciPy's takes fifty times as long for one place as its formula; both agree here.
+    """
+    (east, both), (_, north) = np.linalg.inv(covariance).tolist()
+    scale = 1 / (2 * pi * sqrt(np.linalg.det(covariance)))
 
     def density(r, angle):
-        return r * found.pdf([r * np.cos(angle), r * np.sin(angle)])
+        right, up = r * cos(angle) - mean[0], r * sin(angle) - mean[1]
+        return r * scale * exp(-0.5 * (east * right**2 + 2 * both * right * up + north * up**2))
+
+    known = stats.multivariate_normal(mean, covariance).pdf([3.0, 4.0])
+    assert density(5.0, atan2(4.0, 3.0)) == pytest.approx(5.0 * known, rel=1e-12)
 
     far = radius + np.hypot(*mean) + 12 * sqrt(np.linalg.eigvalsh(covariance)[-1])
     whole = integrate.dblquad(density, -pi, pi, radius, far, epsabs=1e-10, epsrel=1e-6)
@@ -123,12 +133,19 @@ WAYS = {
 }
 
 
-@pytest.mark.parametrize("name", WAYS)
+@cache
+def many(name):
+    """Return two million ordered distances, and the generator behind them."""
+    rng = np.random.default_rng(7)
+    return np.sort(np.hypot(*WAYS[name](rng, 2_000_000).T)), rng
+
+
 @pytest.mark.parametrize("count", [300, 1000, 5000])
+@pytest.mark.parametrize("name", WAYS)
 def test_a_thousand_samples_give_a_level_for_one_in_a_thousand(name, count):
     """Over many draws of the samples: nearly always enough, and seldom twice too much."""
-    rng = np.random.default_rng(7)
-    away = np.sort(np.hypot(*WAYS[name](rng, 2_000_000).T))
+    away, rng = many(name)
+    rng = deepcopy(rng)
     right_m = away[int(0.999 * away.size)]
     weight = rng.gamma(2.0, size=(60, count))
     levels = np.array([cloud(WAYS[name](rng, count), w).protection_m(1e-3) for w in weight])

@@ -22,7 +22,8 @@ print(json.dumps([len(log.radio) + len(log.motion), int(peak_kb) / 1024]))
 def written(folder, name):
     times = np.arange(ROWS)
     if name == "motion":
-        lines = [f"{i}.0,1.4,{0.001 * (i % 6000) - 3:.6f}\n" for i in times.tolist()]
+        headings = [f"{0.001 * k - 3:.6f}" for k in range(6000)]
+        lines = [f"{i}.0,1.4,{headings[i % 6000]}\n" for i in times.tolist()]
         head = "time_s,step_m,heading_rad\n"
     else:
         # Seven cells each second.
