@@ -19,7 +19,7 @@ from mapfilter.filters.contract import Status
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.positioned_track import Snapshot
 from mapfilter.report.ground import BaseMap
-from mapfilter.workflows.outputs import track_pictures
+from mapfilter.workflows.outputs import drawer, track_pictures
 from mapfilter.workflows.outputs.track_pictures import (
     TrackPictures,
     begin_belief,
@@ -100,6 +100,14 @@ def test_a_stopped_replay_leaves_no_process(monkeypatch):
     while child.is_alive() and time.monotonic() < until_s:
         time.sleep(0.01)
     assert not child.is_alive()
+
+
+def test_the_process_that_draws_keeps_freed_memory(monkeypatch):
+    done = []
+    monkeypatch.setattr(drawer, "keep_freed_memory", lambda: done.append("kept"))
+    monkeypatch.setattr(track_pictures, "get_ready_to_draw", lambda: done.append("ready"))
+    drawer._call(*drawer._READY)
+    assert done == ["kept", "ready"]
 
 
 def test_what_locates_imports_neither_what_draws_nor_what_reads_maps_and_rasters():

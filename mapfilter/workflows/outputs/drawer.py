@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
 
+from mapfilter._memory import keep_freed_memory
 from mapfilter._parallel import SerialExecutor, begun, spare_processes
 
 DRAWING_LIBRARY = "matplotlib"
@@ -41,4 +42,6 @@ def drawer_process(library: str = DRAWING_LIBRARY) -> Iterator[Executor]:
 
 
 def _call(module: str, name: str) -> None:
+    # Each picture needs as much for its pixels, several times.
+    keep_freed_memory()
     getattr(import_module(module), name)()
