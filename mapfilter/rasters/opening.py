@@ -43,9 +43,14 @@ FORMATS: Mapping[str, Opener] = {
 }
 """Formats of raster files by suffix. A new one needs its module and a line here."""
 _OTHER_FORMATS: Mapping[tuple[str, ...], str] = {
-    (".bin", ".dat", ".raw"): "pixels without a header, as of Planet: rename it to .bil, and write "
-    "a .hdr beside it from the tool's index (NROWS, NCOLS, NBITS 16, BYTEORDER M or I, XLLCORNER, "
-    "YLLCORNER, CELLSIZE)",
+    (
+        ".bin",
+        ".dat",
+        ".raw",
+    ): "pixels without a header: beside an index of Planet (index.txt: "
+    "name, west, east, south, north and side of a pixel) they are read; else rename it to .bil, "
+    "and write a .hdr beside it (NROWS, NCOLS, NBITS 16, BYTEORDER M or I, XLLCORNER, YLLCORNER, "
+    "CELLSIZE)",
     (".grc",): "classes of Vertical Mapper, without levels: export a .grd, which gdal_translate "
     "FROM.grd TO.tif converts",
     (".xyz", ".txt", ".csv", ".tab"): "points as text are no rasters: gdal_translate FROM.xyz "
