@@ -103,7 +103,7 @@ class IndexRow:
 
 def find_index(folder: Path) -> Path | None:
     """Return the index in a folder, or None; several are an error."""
-    found = [path for path in sorted(folder.iterdir()) if _is_index(path)]
+    found = [path for path in sorted(folder.iterdir()) if is_index(path)]
     if len(found) > 1:
         names = ", ".join(path.name for path in found[:5])
         raise fail(InputError, str(folder), "one index of rasters", names, "name one of them")
@@ -182,7 +182,8 @@ def _of_planet(path: Path, lines: Sequence[PlanetLine]) -> tuple[IndexRow, ...]:
     return tuple(rows)
 
 
-def _is_index(path: Path) -> bool:
+def is_index(path: Path) -> bool:
+    """Return whether a file is an index of rasters, of Atoll or Planet."""
     named = path.suffix.lower() in (*INDEX_SUFFIXES, "") and path.stem.lower() == "index"
     return _is_listed(path) or (named and path.is_file() and bool(planet_lines(path)))
 

@@ -18,7 +18,7 @@ from mapfilter.errors import Fault, Faults, InputError, fail, listed
 from mapfilter.geodesy import projected_crs
 from mapfilter.radio.cell_rules import id_fault
 from mapfilter.rasters.ascii_grids import open_ascii_grid
-from mapfilter.rasters.atoll import IndexRow, index_of, read_index
+from mapfilter.rasters.atoll import IndexRow, index_of, is_index, read_index
 from mapfilter.rasters.files import (
     Declared,
     Quantity,
@@ -161,8 +161,8 @@ def open_rasters(
 
 
 def is_raster_folder(path: Path) -> bool:
-    """Return whether a folder holds rasters."""
-    return path.is_dir() and any(_is_raster(inner) for inner in path.iterdir())
+    """Return whether a folder holds rasters, or an index of them."""
+    return path.is_dir() and any(_is_raster(one) or is_index(one) for one in path.iterdir())
 
 
 def _check_options(

@@ -5,6 +5,7 @@ import pytest
 
 from mapfilter.errors import InputError
 from mapfilter.rasters.opening import open_rasters
+from mapfilter.workflows.info import run_info
 
 CRS = "EPSG:32635"
 WEST_M, NORTH_M, SIDE_M, ROWS, COLS = 385_000.0, 6_673_000.0, 20.0, 5, 8
@@ -37,6 +38,11 @@ def test_rasters_are_read_by_their_index(folder, named):
     assert found.lattice.resolution_m == SIDE_M
     np.testing.assert_array_equal(found.read()[0], VALUES)
     np.testing.assert_array_equal(found.read()[1], VALUES - 1)
+
+
+def test_info_knows_their_folder(folder):
+    found = run_info(folder(f"A1.bin {EDGES}\n"))
+    assert (found["kind"], found["cells"], found["resolution_m"]) == ("rasters", 1, SIDE_M)
 
 
 def test_a_number_for_no_data(folder):
