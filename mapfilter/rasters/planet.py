@@ -2,8 +2,8 @@
 
 A line holds the file's name, its western, eastern, southern and northern edge and the side of a
 pixel in metres, and there is no header. Pixels are signed whole numbers of 16 bits, the high byte
-first, rows from the north; -9999 means no data. The layout is that of published readers of such
-exports; no export of the tool itself was at hand.
+first, rows from the north; -9999 is taken for no data. The layout of lines and pixels is that of a
+published reader of maps in this format; no export of the tool itself was at hand.
 """
 
 from __future__ import annotations
