@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
@@ -13,28 +12,13 @@ from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 
 _LONGITUDES, _LATITUDES = {"lon", "lon_deg", "longitude"}, {"lat", "lat_deg", "latitude"}
-_LARGEST_BYTES, _MOST_ELEMENTS = 1 << 26, 2_000_000
+_MOST_ELEMENTS = 2_000_000
 _HEAD = 1 << 12
 
 
 def is_kml(text: str) -> bool:
     """Return whether a text is KML."""
     return text.lstrip().startswith("<") and "<kml" in text[:_HEAD]
-
-
-def kml_of_kmz(data: bytes) -> bytes | None:
-    """Return the KML in a KMZ; None for another file, such as a workbook, and for a damaged one."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            # The first one is the document, as Google Earth takes it.
-            for member in archive.infolist():
-                if member.filename.lower().endswith(".kml"):
-                    with archive.open(member) as stream:
-                        found = stream.read(_LARGEST_BYTES + 1)
-                    return found if len(found) <= _LARGEST_BYTES else None
-    except (zipfile.BadZipFile, OSError, RuntimeError, NotImplementedError, EOFError):
-        return None
-    return None
 
 
 def placemark_rows(path: Path, text: str) -> tuple[list[str], list[list[str]], tuple[str, ...]]:

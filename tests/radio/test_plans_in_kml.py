@@ -41,7 +41,7 @@ def written(tmp_path):
         content = f"{HEAD.format(encoding)}{''.join(marks)}{end}".encode(encoding)
         path = tmp_path / ("cells.kmz" if packed else "cells.kml")
         if packed:
-            with zipfile.ZipFile(path, "w") as archive:
+            with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
                 archive.writestr("files/icon.png", b"")
                 archive.writestr("doc.kml", content)
         else:
@@ -109,6 +109,11 @@ def test_what_holds_none_is_refused(written, marks, end, told):
 def test_a_damaged_kmz_is_refused(written):
     path = written(mark(data(), POINT), packed=True)
     path.write_bytes(path.read_bytes()[:-30])
+    with pytest.raises(InputError):
+        read_cell_plan(path, CRS)
+    whole = written(mark(data(), POINT), packed=True).read_bytes()
+    at = whole.index(b"doc.kml") + 20
+    path.write_bytes(whole[:at] + bytes(20) + whole[at + 20 :])
     with pytest.raises(InputError):
         read_cell_plan(path, CRS)
     packed = io.BytesIO()
