@@ -175,7 +175,7 @@ def export(
     """Write a radio-route database as GeoPackage, or best server and margin as GeoTIFF."""
     from mapfilter.workflows.databases import run_export
 
-    print_result(run_export(database, to), as_json)
+    print_result(run_export(database, to.absolute()), as_json)
 
 
 def info(path: PathArgument, as_json: JsonOption = False) -> None:

@@ -264,6 +264,8 @@ def replay(
         # With a configuration it is the one that `build` makes of the same file.
         if config is None and (taken := unnamed_database(loaded)) is not None:
             print_message(f"no --db: the database is {taken}")
+        if config is None and loaded.track.path is None:
+            print_message(f"no --log: the logs are those of {loaded.track_path}")
         folder = (out or loaded.output.dir / "replay").absolute()
         printed: dict[str, None] = {}
         with progress_bar("replay") as progress, already_noted(printed):

@@ -21,6 +21,7 @@ from mapfilter._inputs import first_foreign_byte, read_input, wide_encoding
 from mapfilter._separator_line import without_separator_line
 from mapfilter._words import number_of
 from mapfilter.errors import Faults, InputError, MapfilterError, fail
+from mapfilter.radio.placemarks import is_kml, placemark_rows
 
 _LARGEST_BYTES = 1 << 26
 _LARGEST_UNPACKED_BYTES = 1 << 29
@@ -32,7 +33,7 @@ _WIDE_SHARE = 0.4
 _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """First bytes of .xlsx and .ods, and of .xls."""
 _GZIP = b"\x1f\x8b"
-_OTHERS = {"<": "XML, such as KML", "{": "JSON", "[{": "JSON"}
+_OTHERS = {"<": "XML that is no KML", "{": "JSON", "[{": "JSON"}
 """How files of other kinds begin, which hold no table of lines."""
 
 
@@ -106,7 +107,7 @@ def read_table(path: Path, what: str) -> Table:
     It may be packed with gzip. Text has commas, semicolons or tabs, and is UTF-8, UTF-16 or UTF-32
     with a byte order mark, or else Windows-1252 (with a note); a first line ``sep=;`` is no header,
     nor are up to ten lines of a title, which fill one field each (with a note). Of a workbook
-    (.xlsx, .xls, .ods) the first sheet is read.
+    (.xlsx, .xls, .ods) the first sheet is read, and of KML or KMZ the placemarks with data.
 
     Parameters
     ----------
@@ -121,9 +122,13 @@ def read_table(path: Path, what: str) -> Table:
     data = read_input(path, _LARGEST_BYTES, what)
     if data.startswith(_GZIP):
         data = _unpacked(path, data, what)
+    if data.startswith(b"PK") and (kml := _kml_of(data)) is not None:
+        data = kml
     if data.startswith(_WORKBOOKS):
         return _read_workbook(path, data, what)
     text, notes = _decoded(path, data)
+    if is_kml(text):
+        return _read_placemarks(path, text, notes, what)
     for mark, kind in _OTHERS.items():
         if text.lstrip().startswith(mark):
             hint = "export the list as CSV or as a workbook, with a row for each cell"
@@ -263,6 +268,27 @@ def _read_workbook(path: Path, data: bytes, what: str) -> Table:
     note = f"{path.name}: sheet {sheets[0]!r} of a workbook{others}"
     lines, titles = _without_titles(path, lines)
     return Table(path, "", tuple(lines[0][1]), tuple(lines[1:]), (note, *titles))
+
+
+def _kml_of(data: bytes) -> bytes | None:
+    """Return the KML in a KMZ; None for another file, such as a workbook, and for a damaged one."""
+    wrong = (zipfile.BadZipFile, zlib.error, OSError, RuntimeError, EOFError)
+    with suppress(*wrong), zipfile.ZipFile(io.BytesIO(data)) as archive:
+        for member in archive.infolist():
+            # The first one is the document, as Google Earth takes it.
+            if member.filename.lower().endswith(".kml") and member.file_size <= _LARGEST_BYTES:
+                return archive.read(member)
+    return None
+
+
+def _read_placemarks(path: Path, text: str, notes: tuple[str, ...], what: str) -> Table:
+    header, rows, told = placemark_rows(path, text)
+    if len(header) > MOST_COLUMNS:
+        expected = f"{what} of at most {MOST_COLUMNS} columns"
+        raise fail(InputError, f"{path}, header", expected, len(header), "another file")
+    if len(header) * len(rows) > MOST_FIELDS:
+        raise _too_large(path, what, len(rows))
+    return Table(path, "", tuple(header), tuple(enumerate(rows, start=1)), (*notes, *told))
 
 
 def _text(value: Any) -> str:

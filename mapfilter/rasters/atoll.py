@@ -10,7 +10,7 @@ one for the other shifts everything by half a pixel.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
@@ -22,6 +22,7 @@ from mapfilter.errors import Faults, InputError, fail
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cell_rules import id_fault
 from mapfilter.radio.tables import Table, read_table
+from mapfilter.rasters.planet import BITS, HEADER, PlanetLine, planet_lines
 
 INDEX_COLUMNS = ("TX_NAME", "FILE_NAME")
 """Columns that make a table an index of rasters."""
@@ -36,7 +37,8 @@ _SAME_PX = 0.01
 class IndexRow:
     """A row of an index: ``where`` it is, its cell and raster, and the raster's size and place.
 
-    ``area_m`` are the western, southern, eastern and northern edges.
+    ``area_m`` are the western, southern, eastern and northern edges, and ``more`` what else a
+    header would hold.
     """
 
     where: str
@@ -45,6 +47,7 @@ class IndexRow:
     resolution_m: float | None = None
     bits: float | None = None
     area_m: tuple[float, float, float, float] | None = None
+    more: tuple[tuple[str, str], ...] = ()
 
     def header(self) -> tuple[str, dict[str, str]] | None:
         """Return the place and values of a header for a raster without one, if there is enough."""
@@ -59,6 +62,7 @@ class IndexRow:
             "YDIM": repr(self.resolution_m),
             "ULXMAP": repr(west + self.resolution_m / 2),
             "ULYMAP": repr(north - self.resolution_m / 2),
+            **dict(self.more),
         }
         return self.where, values
 
@@ -99,7 +103,7 @@ class IndexRow:
 
 def find_index(folder: Path) -> Path | None:
     """Return the index in a folder, or None; several are an error."""
-    found = [path for path in sorted(folder.iterdir()) if _is_index(path)]
+    found = [path for path in sorted(folder.iterdir()) if is_index(path)]
     if len(found) > 1:
         names = ", ".join(path.name for path in found[:5])
         raise fail(InputError, str(folder), "one index of rasters", names, "name one of them")
@@ -114,7 +118,7 @@ def index_of(path: Path) -> Path | None:
 
 
 def read_index(path: Path) -> tuple[IndexRow, ...]:
-    """Read an index of rasters.
+    """Read an index of rasters, also one of Planet, which has no header.
 
     Raises
     ------
@@ -122,6 +126,8 @@ def read_index(path: Path) -> tuple[IndexRow, ...]:
         With every fault: columns missing, a name that leads out of the folder, a raster that is
         not there, numbers that cannot be read, an id given twice.
     """
+    if not _is_listed(path) and (lines := planet_lines(path)):
+        return _once_each(_of_planet(path, lines))
     table = read_table(path, "an index of rasters")
     header = [name.strip('" ').upper() for name in table.header]
     faults = Faults()
@@ -135,6 +141,12 @@ def read_index(path: Path) -> tuple[IndexRow, ...]:
         raise fail(InputError, str(path), "at least one raster", "a header without rows")
     names = {file.name.lower(): file.name for file in path.parent.iterdir()}
     rows = tuple(_rows(table, header, names, faults))
+    return _once_each(rows, faults)
+
+
+def _once_each(rows: tuple[IndexRow, ...], faults: Faults | None = None) -> tuple[IndexRow, ...]:
+    """Return rows of which none has the cell of another one; raise the faults otherwise."""
+    faults = faults or Faults()
     first: dict[str, str] = {}
     for row in rows:
         if row.cell_id in first:
@@ -146,7 +158,37 @@ def read_index(path: Path) -> tuple[IndexRow, ...]:
     return rows
 
 
-def _is_index(path: Path) -> bool:
+def _of_planet(path: Path, lines: Sequence[PlanetLine]) -> tuple[IndexRow, ...]:
+    faults, rows = Faults(), list[IndexRow]()
+    names = {file.name.lower(): file.name for file in path.parent.iterdir()}
+    for one in lines:
+        where = f"{path} row {one.line}"
+        file, cell_id = _within(path.parent, one.name, names), PurePosixPath(one.name).stem
+        west, south, east, north = one.area_m
+        if file is None:
+            expected = f"the name of a file in {path.parent}"
+            hint = "rasters moved elsewhere, or exported to another folder"
+            faults.add(f"{where}, name", expected, repr(one.name[:80]), hint)
+        elif wrong := id_fault(cell_id):
+            faults.add(f"{where}, name", *wrong)
+        elif not (west < east and south < north and one.resolution_m > 0):
+            expected = "west < east, south < north, and the side of a pixel > 0"
+            got = ", ".join(f"{value:g}" for value in (west, east, south, north, one.resolution_m))
+            faults.add(f"{where}, area", expected, got, "another order of columns")
+        else:
+            more = IndexRow(where, cell_id, file, one.resolution_m, BITS, one.area_m, HEADER)
+            rows.append(more)
+    faults.raise_if_any(InputError)
+    return tuple(rows)
+
+
+def is_index(path: Path) -> bool:
+    """Return whether a file is an index of rasters, of Atoll or Planet."""
+    named = path.suffix.lower() in (*INDEX_SUFFIXES, "") and path.stem.lower() == "index"
+    return _is_listed(path) or (named and path.is_file() and bool(planet_lines(path)))
+
+
+def _is_listed(path: Path) -> bool:
     if path.suffix.lower() not in INDEX_SUFFIXES or path.name.startswith(".") or not path.is_file():
         return False
     try:

@@ -18,7 +18,7 @@ from mapfilter.errors import Fault, Faults, InputError, fail, listed
 from mapfilter.geodesy import projected_crs
 from mapfilter.radio.cell_rules import id_fault
 from mapfilter.rasters.ascii_grids import open_ascii_grid
-from mapfilter.rasters.atoll import IndexRow, index_of, read_index
+from mapfilter.rasters.atoll import IndexRow, index_of, is_index, read_index
 from mapfilter.rasters.files import (
     Declared,
     Quantity,
@@ -43,9 +43,14 @@ FORMATS: Mapping[str, Opener] = {
 }
 """Formats of raster files by suffix. A new one needs its module and a line here."""
 _OTHER_FORMATS: Mapping[tuple[str, ...], str] = {
-    (".bin", ".dat", ".raw"): "pixels without a header, as of Planet: rename it to .bil, and write "
-    "a .hdr beside it from the tool's index (NROWS, NCOLS, NBITS 16, BYTEORDER M or I, XLLCORNER, "
-    "YLLCORNER, CELLSIZE)",
+    (
+        ".bin",
+        ".dat",
+        ".raw",
+    ): "pixels without a header: beside an index of Planet (index.txt: "
+    "name, west, east, south, north and side of a pixel) they are read; else rename it to .bil, "
+    "and write a .hdr beside it (NROWS, NCOLS, NBITS 16, BYTEORDER M or I, XLLCORNER, YLLCORNER, "
+    "CELLSIZE)",
     (".grc",): "classes of Vertical Mapper, without levels: export a .grd, which gdal_translate "
     "FROM.grd TO.tif converts",
     (".xyz", ".txt", ".csv", ".tab"): "points as text are no rasters: gdal_translate FROM.xyz "
@@ -156,8 +161,8 @@ def open_rasters(
 
 
 def is_raster_folder(path: Path) -> bool:
-    """Return whether a folder holds rasters."""
-    return path.is_dir() and any(_is_raster(inner) for inner in path.iterdir())
+    """Return whether a folder holds rasters, or an index of them."""
+    return path.is_dir() and any(_is_raster(one) or is_index(one) for one in path.iterdir())
 
 
 def _check_options(

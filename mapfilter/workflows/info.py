@@ -152,7 +152,10 @@ def _file_info(path: Path) -> dict[str, Any]:
             return found
     if suffix in _TABLES and _INDEX_COLUMN not in _first_line(path):
         return _table_info(path)
-    if begin.lstrip().startswith(b"<") and b"<kml" in begin[:_HEAD_BYTES].lower():
+    of_kml = begin.lstrip().startswith(b"<") and b"<kml" in begin[:_HEAD_BYTES].lower()
+    if (of_kml and b"<ExtendedData" in begin) or suffix == ".kmz":
+        return _table_info(path)
+    if of_kml:
         hint = (
             "export the places of cells as CSV, and a journey with its times (gx:Track) or as GPX"
         )

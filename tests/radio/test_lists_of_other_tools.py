@@ -34,7 +34,7 @@ def test_a_packed_list_as_opencellid_has_it(tmp_path):
             read_cell_plan(written(tmp_path, content, "a.gz"), CRS, layout="opencellid")
 
 
-@pytest.mark.parametrize("content", ['<?xml version="1.0"?><kml>,</kml>', '{"a": 1, "b": 2}'])
+@pytest.mark.parametrize("content", ['<?xml version="1.0"?><list>,</list>', '{"a": 1, "b": 2}'])
 def test_xml_and_json_are_named(tmp_path, content):
     """Each part between two commas was refused as an unknown column."""
     with pytest.raises(InputError, match=r"found (XML|JSON).*export the list as CSV"):

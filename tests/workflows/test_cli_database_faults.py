@@ -255,6 +255,13 @@ def test_a_full_disk(command, own_world, monkeypatch):
     assert contents(own_world.folder) == before
 
 
+def test_an_export_is_named_by_its_whole_path(world, tmp_path, monkeypatch):
+    """As other commands name what they write."""
+    monkeypatch.chdir(tmp_path)
+    done = mapfilter("export", world.database, "--to", "a.gpkg", "--json")
+    assert done.json["file"] == str(tmp_path / "a.gpkg")
+
+
 @pytest.mark.parametrize("command", ["predict", "build", "simulate", "replay", "export"])
 @pytest.mark.parametrize("limit_bytes", [500, 8_000, 50_000])
 def test_a_limit_on_the_size_of_files(command, limit_bytes, own_world):

@@ -476,6 +476,18 @@ def test_a_database_that_nobody_names_is_named(log, world, tmp_path, monkeypatch
     assert_done(mapfilter("replay", "--log", log, *named, *few, "--json"))
 
 
+def test_logs_that_nobody_names_are_named(log, world, tmp_path, monkeypatch):
+    """Without --log simulated journeys of the folder were located, and nothing said so."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "out").mkdir()
+    taken = tmp_path / "out" / "journeys"
+    taken.symlink_to(log.parent)
+    named = "--db", world.out / "database", *settings(output__pictures="none")
+    done = mapfilter("replay", *named, "--json")
+    assert done.code == 0
+    assert done.err == f"mapfilter: no --log: the logs are those of {taken}\n"
+
+
 def test_python_draws_as_the_command_by_the_name_of_the_log(world, log, replay, tmp_path):
     assert_done(replay(log, "--filter", "bayes", "--seed", "3"))
     written = read_estimate(tmp_path / "out" / "estimate.parquet")

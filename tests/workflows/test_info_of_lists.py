@@ -1,6 +1,7 @@
 """What info says of the lists of cells that planning tools and databases hand out."""
 
 import gzip
+import zipfile
 
 import pytest
 
@@ -44,3 +45,17 @@ def test_kml_of_places_is_no_raster(tmp_path):
     )
     with pytest.raises(InputError, match="found KML without times"):
         info_of(tmp_path, f"<?xml version='1.0'?><kml>{place}</kml>", "a.kml")
+
+
+def test_a_plan_in_kml_is_known(tmp_path):
+    data = "".join(f'<Data name="{name}"><value>1</value></Data>' for name in
+                   ("height_m", "azimuth_deg", "eirp_dbm", "frequency_mhz"))  # fmt: skip
+    mark = f"<name>A</name><ExtendedData>{data}</ExtendedData>"
+    mark += "<Point><coordinates>24.9,60.2</coordinates></Point>"
+    kml = f"<kml><Placemark>{mark}</Placemark></kml>"
+    (tmp_path / "cells.kml").write_text(kml)
+    with zipfile.ZipFile(tmp_path / "cells.kmz", "w") as archive:
+        archive.writestr("doc.kml", kml)
+    for name in ("cells.kml", "cells.kmz"):
+        found = run_info(tmp_path / name)
+        assert (found["kind"], found["use"], found["rows"]) == ("cell plan", "cells.plan", 1)
