@@ -20,7 +20,6 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from mapfilter._late_modules import read_parts_late
 from mapfilter._memory import search_cycles_rarely
 from mapfilter.errors import MapfilterError, fail
 
@@ -191,7 +190,6 @@ def _or_no_process() -> Iterator[None]:
 
 def _start_worker(parent: int, watched: Connection) -> None:
     search_cycles_rarely()
-    read_parts_late()
     # The main process ends its workers on Ctrl-C.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if sys.platform == "linux":

@@ -14,7 +14,6 @@ from typer.main import get_command
 
 from mapfilter._io import program_version
 from mapfilter._kernel_cache import keep_kernels
-from mapfilter._late_modules import read_parts_late
 from mapfilter._memory import keep_freed_memory, search_cycles_rarely
 from mapfilter.cli.convert import convert
 from mapfilter.cli.databases import bound, build, check, export, info, merge, predict
@@ -108,7 +107,6 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     keep_freed_memory()
     search_cycles_rarely()
-    read_parts_late()
     # The command itself, because a Typer app puts its own hook for exceptions in place.
     sys.exit(guarded(_run))
 
