@@ -1,14 +1,10 @@
 """Pictures as PNG, SVG and PDF, on given axes; tables as CSV and LaTeX."""
 
-from io import BytesIO
-
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib import rc_context
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
-from PIL import Image
 
 from mapfilter.errors import InputError, OutputError
 from mapfilter.evaluation.truth import Truth
@@ -16,14 +12,14 @@ from mapfilter.filters.contract import Reason, Status
 from mapfilter.positioning.estimate import TrackEstimate
 from mapfilter.positioning.step_output import Fix
 from mapfilter.report.basemap import BaseMap
-from mapfilter.report.canvas import BLACK, BLUE, DPI, distinct_colours, saved
+from mapfilter.report.canvas import BLACK, BLUE, distinct_colours
 from mapfilter.report.cumulative import Distribution, plot_cumulative
 from mapfilter.report.errors import (
     plot_error_over_distance,
     plot_errors_apart,
     plot_errors_over_time,
 )
-from mapfilter.report.saving import png_of, save
+from mapfilter.report.saving import save
 from mapfilter.report.table import latex_table, write_table
 from mapfilter.report.track import plot_track
 
@@ -157,31 +153,3 @@ def test_ticks_of_a_figure_of_the_users_own_are_mathematical_text(tmp_path):
     found = words(lambda figure: save(figure, tmp_path / "own.png"))
     assert any("$" in text for text in found)
     assert all(found.values())
-
-
-@saved
-def drawn_by_matplotlib(figure):
-    stream = BytesIO()
-    figure.savefig(stream, format="png", dpi=DPI)
-    return stream
-
-
-@pytest.mark.parametrize("opacity", [1.0, 0.3])
-@pytest.mark.parametrize("width_in", [2.0, 3.337, 1 / 3, 12.899999999999999])
-def test_pictures_are_pixel_by_pixel_those_of_matplotlib(width_in, opacity):
-    figure = Figure(figsize=(width_in, 1.501), facecolor=(0.2, 0.4, 0.6, opacity))
-    axes = figure.add_axes((0.2, 0.2, 0.6, 0.6), facecolor=(0, 0, 0, 0))
-    axes.plot([0, 1, 2], [0, 3, 1])
-    found, expected = (
-        Image.open(one) for one in (BytesIO(png_of(axes)), drawn_by_matplotlib(figure))
-    )
-    assert (found.mode, found.size) == (expected.mode, expected.size)
-    assert np.array_equal(np.asarray(found), np.asarray(expected))
-    assert found.info["dpi"] == pytest.approx(expected.info["dpi"])
-    assert "Software" not in found.info
-
-
-def test_a_setting_of_the_users_own_does_not_cut_pictures():
-    axes = Figure(figsize=(4.0, 4.0)).add_axes((0.4, 0.4, 0.2, 0.2))
-    with rc_context({"savefig.bbox": "tight"}):
-        assert Image.open(BytesIO(png_of(axes))).size == (4 * DPI, 4 * DPI)
