@@ -232,7 +232,11 @@ def test_filters_of_a_sweep_are_compared_run_by_run(database, rasters, streets):
         at = one.sigma_orient_deg
         assert one.success == rates[at, one.reading] - rates[at, "c"]
     for figure in ("error_at_switch_m", "error_mean_m", "switch_distance_m"):
-        assert found.plot(figure=figure).get_legend_handles_labels()[1] == list(filters)
+        shown = found.plot(figure=figure).get_legend_handles_labels()[1]
+        assert [label.partition(": ")[0] for label in shown] == list(filters)
+        for name, label in zip(filters, shown, strict=True):
+            none = found.runs.loc[found.runs["reading"] == name, figure].isna().all()
+            assert label.endswith(": no run switched") == none
     with pytest.raises(mf.MapfilterError, match="compare, baseline: expected one of 'c', 'mine'"):
         found.compare("d")
     with pytest.raises(mf.MapfilterError, match="beside another filter"):
