@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from math import isfinite, isnan, nan
 from typing import Any
 
@@ -158,7 +158,11 @@ class Epoch(EqualByValue):
     def measured(self) -> bool:
         """Whether something besides motion was measured; NaN, None and ``()`` are no reading."""
         readings = (self.radio, self.gnss, self.pseudoranges, self.tdoa)
-        return any(map(_is_reading, readings))
+        if any(map(_is_reading, readings)):
+            return True
+        # Epochs of other measurements have fields of their own.
+        own = fields(self)[len(fields(Epoch)) :] if type(self) is not Epoch else ()
+        return any(_is_reading(getattr(self, one.name)) for one in own)
 
     def as_checked(self) -> Epoch:
         """Return the epoch itself, its values being known to be in their ranges."""
