@@ -66,7 +66,8 @@ def _known(time_s: Floats, at_s: Floats) -> Bools:
     silent_s = np.diff(time_s)
     longest_s = max(_GAP_S, _GAPS * float(np.median(silent_s)))
     on_a_row = (time_s[after] == at_s) | (time_s[after - 1] == at_s)
-    return on_a_row | (silent_s[after - 1] <= longest_s)
+    known: Bools = on_a_row | (silent_s[after - 1] <= longest_s)
+    return known
 
 
 def best_place_shift(one: TimedPlaces, other: TimedPlaces, shifts: Floats) -> tuple[float, float]:
