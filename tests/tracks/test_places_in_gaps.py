@@ -37,3 +37,10 @@ def test_ends_of_a_gap_are_known():
     slow = np.array([0.0, 40, 80]), np.zeros(3), np.array([0.0, 1, 2])
     between = np.array([10.0, 20, 30]), np.zeros(3), np.array([0.25, 0.5, 0.75])
     assert median_apart_m(slow, between, 0.0, 0.1) == pytest.approx(0, abs=1e-6)
+
+
+def test_a_track_of_one_place_has_no_gaps():
+    once = np.array([10.0]), np.array([8.0]), np.array([50.0])
+    stood = np.full(9, 10.0), np.full(9, 8.0), np.full(9, 50.0)
+    assert median_apart_m(once, stood, 0.0, 0.1) == 0.0
+    assert np.isnan(median_apart_m(once, stood, 1.0, 0.1))

@@ -62,6 +62,8 @@ def median_apart_m(one: TimedPlaces, other: TimedPlaces, shift_s: float, least: 
 
 def _known(time_s: Floats, at_s: Floats) -> Bools:
     """Return which moments lie in no gap of a track, such as that of a receiver that is jammed."""
+    if len(time_s) < 2:
+        return np.isin(at_s, time_s)
     after = np.searchsorted(time_s, at_s).clip(1, len(time_s) - 1)
     silent_s = np.diff(time_s)
     longest_s = max(_GAP_S, _GAPS * float(np.median(silent_s)))
