@@ -1,12 +1,12 @@
 """Epochs that a program gives to a filter itself.
 
-Values of epochs have the types and ranges of a log's tables. Rows of a log are checked when epochs
-are made of it (:func:`marked`), and not again at each step.
+Values of epochs have the types and ranges of a log's tables. Those of a log were checked when it
+was read; the test that all is well costs them little.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import inf, isnan
 from typing import Any
@@ -104,7 +104,7 @@ def check_epoch(epoch: Epoch) -> None:
     InputError
         With all faults of the epoch together, in the words of a log's tables.
     """
-    if (type(epoch) is Epoch and epoch.is_checked) or _is_well(epoch):
+    if _is_well(epoch):
         return
     faults = Faults()
     given: Any = epoch
@@ -122,22 +122,6 @@ def check_epoch(epoch: Epoch) -> None:
     faults.raise_if_any(InputError)
 
 
-def marked(merged: list[Epoch], rows: Iterable[Any]) -> list[Epoch]:
-    """Return epochs of a log, in the order of time, marked as checked where all is as expected.
-
-    Parameters
-    ----------
-    merged : list of Epoch
-    rows : iterable
-        All their different rows: reports repeat themselves.
-    """
-    ends_s = (one.time_s for one in (merged[:1] + merged[-1:]))
-    if all(_is_within(time_s, _TIME.low, _TIME.high) for time_s in ends_s) and _are_well(rows):
-        for epoch in merged:
-            epoch.as_checked()
-    return merged
-
-
 def _is_well(epoch: Any) -> bool:
     """Return whether all values are as expected; most epochs end here."""
     if not (isinstance(epoch, Epoch) and _is_within(epoch.time_s, _TIME.low, _TIME.high)):
@@ -146,13 +130,9 @@ def _is_well(epoch: Any) -> bool:
     # What can be gone over once only would be empty afterwards.
     if not all(map(_are_rows, parts)):
         return False
-    rows = (*epoch.motion, *epoch.radio, *epoch.pseudoranges, *epoch.tdoa)
-    return _are_well(rows if epoch.gnss is None else (*rows, epoch.gnss))
-
-
-def _are_well(rows: Iterable[Any]) -> bool:
-    """Return whether all values of rows of epochs have their types and ranges."""
     try:
+        rows = (*epoch.motion, *epoch.radio, *epoch.pseudoranges, *epoch.tdoa)
+        rows = rows if epoch.gnss is None else (*rows, epoch.gnss)
         return all(map(_row_is_well, rows))
     except (TypeError, ValueError, KeyError):
         return False

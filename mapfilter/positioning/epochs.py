@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from math import isfinite, isnan, nan
 from typing import Any
 
@@ -135,9 +135,6 @@ class Epoch(EqualByValue):
     gnss : GnssFix or None
     pseudoranges : tuple of Pseudorange
     tdoa : tuple of Difference
-    is_checked : bool
-        Whether its values are known to be in their ranges, as those of a log are. No argument, and
-        False of copies with other values.
 
     Examples
     --------
@@ -152,22 +149,11 @@ class Epoch(EqualByValue):
     gnss: GnssFix | None = None
     pseudoranges: tuple[Pseudorange, ...] = ()
     tdoa: tuple[Difference, ...] = ()
-    is_checked: bool = field(default=False, init=False, repr=False, compare=False)
 
     @property
     def measured(self) -> bool:
         """Whether something besides motion was measured; NaN, None and ``()`` are no reading."""
-        readings = (self.radio, self.gnss, self.pseudoranges, self.tdoa)
-        if any(map(_is_reading, readings)):
-            return True
-        # Epochs of other measurements have fields of their own.
-        own = fields(self)[len(fields(Epoch)) :] if type(self) is not Epoch else ()
-        return any(_is_reading(getattr(self, one.name)) for one in own)
-
-    def as_checked(self) -> Epoch:
-        """Return the epoch itself, its values being known to be in their ranges."""
-        object.__setattr__(self, "is_checked", True)
-        return self
+        return any(_is_reading(getattr(self, one.name)) for one in fields(self)[2:])
 
 
 def _is_reading(value: Any) -> bool:

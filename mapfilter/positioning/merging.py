@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from itertools import chain
+from collections.abc import Callable, Mapping, Sequence
 from math import isnan, nan
 from typing import Any, NamedTuple
 
@@ -14,7 +13,6 @@ from mapfilter._arguments import Argument, check_arguments
 from mapfilter.errors import InputError, fail
 from mapfilter.filters.contract import MotionStep
 from mapfilter.geodesy import projected_crs, short_crs
-from mapfilter.positioning.epoch_checks import marked
 from mapfilter.positioning.epochs import Difference, Epoch, GnssFix, Pseudorange, ReportRow
 from mapfilter.tracks.checks.placeless import (
     LOCAL_FRAME,
@@ -63,7 +61,7 @@ def epochs(log: TrackLog, crs: str = "") -> list[Epoch]:
                 fields_now[one.name] = one.of_rows(table.rows[table.first[k] : table.first[k + 1]])
                 ahead[one] = k + 1
         merged.append(Epoch(time_s, **fields_now))
-    return marked(merged, chain.from_iterable(one.different for one in tables.values()))
+    return merged
 
 
 def _placed(log: TrackLog, crs: str) -> TrackLog:
@@ -108,12 +106,11 @@ def make_epoch(time_s: float, rows: Mapping[str, Sequence[Sequence[Any]]]) -> Ep
 
 
 class _Timed(NamedTuple):
-    """Rows of a table in the order of time, the first one of each of its times, different rows."""
+    """Rows of a table in the order of time, and the first one of each of its times."""
 
     time_s: list[float]
     first: list[int]
     rows: list[Any]
-    different: Collection[Any]
 
 
 def _by_time(log: TrackLog, name: str) -> _Timed:
@@ -135,7 +132,7 @@ def _by_time(log: TrackLog, name: str) -> _Timed:
         order = np.argsort(time_s, kind="stable")
         time_s, rows = time_s[order], [rows[k] for k in order.tolist()]
     times, first = np.unique(time_s, return_index=True)
-    return _Timed(times.tolist(), [*first.tolist(), len(rows)], rows, made.values())
+    return _Timed(times.tolist(), [*first.tolist(), len(rows)], rows)
 
 
 def _values(column: pd.Series) -> list[Any]:

@@ -4,7 +4,6 @@ from dataclasses import replace
 from math import inf, nan, nextafter, pi
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from mapfilter.errors import InputError
@@ -12,8 +11,6 @@ from mapfilter.filters.contract import MotionStep
 from mapfilter.positioning import epoch_checks
 from mapfilter.positioning.epoch_checks import check_epoch
 from mapfilter.positioning.epochs import Difference, Epoch, GnssFix, Pseudorange, ReportRow
-from mapfilter.positioning.merging import epochs
-from mapfilter.tracks.log import make_log
 
 FULL = Epoch(
     10.0,
@@ -226,28 +223,3 @@ def test_a_position_of_no_number_is_refused(name, value):
 def test_rows_are_a_sequence(name, kind, given):
     fault = fault_of(replace(FULL, **{name: given}))
     assert (fault.where, fault.expected) == (f"epoch, {name}", f"a tuple of {kind}")
-
-
-def test_epochs_of_a_log_are_not_checked_again_but_copies_with_other_values_are():
-    log = make_log("EPSG:32632", motion=pd.DataFrame({"time_s": [1.0], "step_m": [1.4]}))
-    (epoch,) = epochs(log)
-    assert epoch.is_checked
-    assert epoch == Epoch(1.0, epoch.motion)
-    check_epoch(epoch)
-    other = replace(epoch, motion=(MotionStep("far", 0.0),))
-    assert not other.is_checked
-    with pytest.raises(InputError, match="step_m"):
-        check_epoch(other)
-
-
-@pytest.mark.parametrize("column", ["step_m", "time_s"])
-def test_epochs_of_tables_that_nothing_has_checked_are(column):
-    """As of a log whose table was exchanged."""
-    motion = pd.DataFrame({"time_s": [1.0, 2.0], "step_m": [1.4, 1.4]})
-    log = make_log("EPSG:32632", motion=motion)
-    log = replace(log, motion=log.motion.assign(**{column: [1.0, 1e300]}))
-    first, last = epochs(log)
-    assert not first.is_checked
-    check_epoch(first)
-    with pytest.raises(InputError, match=column):
-        check_epoch(last)
