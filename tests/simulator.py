@@ -17,7 +17,8 @@ def run_simulated(files: Sequence[Path]) -> None:
     command = [sys.executable, "-m", "pytest", "-x", "-n", "0", "-p", "no:cacheprovider"]
     done = subprocess.run(
         [*command, *map(str, files), "-W", "default"],
-        env={**os.environ, "NUMBA_ENABLE_CUDASIM": "1"},
+        # Options of the outer run would change what is printed.
+        env={**os.environ, "NUMBA_ENABLE_CUDASIM": "1", "PYTEST_ADDOPTS": ""},
         cwd=ROOT,
         capture_output=True,
         text=True,

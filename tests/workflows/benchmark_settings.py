@@ -172,6 +172,7 @@ OF_THE_MAP = {
 READ_AS_FOR_A_BUILD = (
     "area.bbox",
     "cells.plan",
+    "cells.crs",
     "cells.layout",
     "cells.reach_m",
     "cells.antennas",
