@@ -26,7 +26,6 @@ _CODE_REACH_M, _M_PER_DEG = 2000.0, 111_320.0
 """Beyond what is known of a cell its carrier and code may be another one's; of latitude."""
 _UNKNOWN = -1.0
 _PLAIN = "csv"
-_FRAMES = (".parquet", ".pq")
 _EXPECTED = "levels of cells, and positions"
 
 
@@ -46,8 +45,9 @@ def recorded_rows(path: Path) -> Rows | None:
         return _log_rows(path)
     in_table = path.suffix.lower() in OF_TABLES
     known = format_of(path)
+    # Read as text, what holds tables in another form would be a drive test or not by chance, and
     # Parquet is found to be a recording only when it is read.
-    if known is None and path.suffix.lower() not in _FRAMES:
+    if known is None and not in_table:
         return None
     try:
         recording = read_recording(path, options=ReadOptions())
