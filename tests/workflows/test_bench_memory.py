@@ -39,7 +39,8 @@ def test_a_sweep_and_steps_run_on_what_was_made_for_them(tmp_path):
     database, logs = bench_memory.make_world(tmp_path, settings)
     for task in ("track", "smoothed track", "500 particles"):
         loaded, peak = bench_memory.done(task, [database, logs[0]])
-        assert 50e6 < loaded <= peak
+        # Linux counts the pages of each thread in batches of 64, so that a peak may seem to fall.
+        assert 50e6 < loaded < peak + 1e6
 
 
 def test_peers_and_memory_are_two_questions():
