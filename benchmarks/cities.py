@@ -92,7 +92,8 @@ KINDS: Mapping[str, Callable[[CaseResult, Cities], dict[str, str]]] = MappingPro
 def main(kind: str, outs: Sequence[Path]) -> None:
     """Print a header, one row for each case, and one for all together."""
     cities = [rows_of(out) for out in outs]
-    names = json.loads((outs[0] / "benchmark.json").read_text())["cases"]
+    cases = json.loads((outs[0] / "benchmark.json").read_text())["cases"]
+    names = [name for name in cases if any(row["case"] == name for rows in cities for row in rows)]
     for number, name in enumerate([*names, None]):
         chosen = [[row for row in rows if name in (None, row["case"])] for rows in cities]
         case = Case(name or "all")

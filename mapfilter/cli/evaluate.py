@@ -35,6 +35,7 @@ class _Asked:
     map_file: Path | None
     bbox: str | None
     cases: list[str] | None
+    one_case: bool
     filter_name: str | None
     world: str | None
     data: Path | None
@@ -72,7 +73,13 @@ class _Asked:
             "--world": self.world,
             "--config": self.config,
             "--set": self.settings,
+            **self.drawn_case,
         }
+
+    @property
+    def drawn_case(self) -> dict[str, object]:
+        """Whether each route has one case, by option; None where it was not asked for."""
+        return {"--one-case": self.one_case or None}
 
     @property
     def given(self) -> list[str]:
@@ -107,6 +114,13 @@ def evaluate(
             "--case", metavar="NAME", help="A case or set; repeatable. Default: all but satellites."
         ),
     ] = None,
+    one_case: Annotated[
+        bool,
+        typer.Option(
+            "--one-case",
+            help="Each route has one of the cases, drawn, instead of all: more walks in that time.",
+        ),
+    ] = False,
     filter_name: FilterOption = None,
     world: Annotated[
         str | None,
@@ -146,7 +160,7 @@ def evaluate(
 
     check_benchmark(name, data)
     asked = _Asked(
-        *(name, map_file, bbox, cases, filter_name, world, data),
+        *(name, map_file, bbox, cases, one_case, filter_name, world, data),
         *(runs, seed, workers, resume, config, settings, out),
     )
     measure = {"ottawa": _ottawa, "all": _all, "single-reports": _single_reports, "audit": _audit}
@@ -163,7 +177,7 @@ def _ottawa(asked: _Asked) -> tuple[Any, Any]:
     other = None if asked.filter_name == "bayes" else asked.filter_name
     unused = {"--map": asked.map_file, "--bbox": asked.bbox, "--case": asked.cases}
     unused |= {"--filter": other, "--world": asked.world, "--config": asked.config}
-    refuse(unused | {"--set": asked.settings}, asked.name)
+    refuse(unused | {"--set": asked.settings} | asked.drawn_case, asked.name)
     with nothing_left(asked.folder), rate_bar("evaluate", "sessions") as progress:
         result = run_ottawa(
             *asked.folders, runs=asked.runs or RUNS, progress=progress, **asked.of_runs
@@ -218,7 +232,7 @@ def _audit(asked: _Asked) -> tuple[Any, Any]:
     from mapfilter.workflows.evaluations.audit import audit_table, run_audit
     from mapfilter.workflows.evaluations.settings import load_benchmark
 
-    refuse({"--data": asked.data, "--world": asked.world}, asked.name)
+    refuse({"--data": asked.data, "--world": asked.world, **asked.drawn_case}, asked.name)
     given = asked.given
     loaded, _ = load_benchmark("easy", asked.config, given)
     check_custom_filter(loaded)
@@ -251,7 +265,7 @@ def _simulated(asked: _Asked) -> tuple[Any, Any]:
     folder = (asked.out or loaded.output.dir / asked.name).absolute()
     with nothing_left(folder), rate_bar("evaluate", "batches") as progress:
         common: dict[str, Any] = {"cases": asked.cases or (), "fixed": fixed, "progress": progress}
-        common |= {"runs": asked.runs or RUNS} | asked.of_runs
+        common |= {"runs": asked.runs or RUNS, "one_case": asked.one_case} | asked.of_runs
         if foreign:
             result = run_foreign(loaded, foreign, folder, **common)
         else:

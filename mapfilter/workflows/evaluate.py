@@ -151,6 +151,7 @@ def run_global_positioning(
     resume: bool = False,
     progress: Progress | None = None,
     fixed: frozenset[str] = frozenset(),
+    one_case: bool = False,
     pictures: bool = True,
 ) -> EvaluateResult:
     """Predict, build, and run the cases of the benchmark on a map.
@@ -171,6 +172,8 @@ def run_global_positioning(
         Keep what the same benchmark has finished.
     progress : callable, optional
         Called with batches done and batches in all.
+    one_case : bool
+        Each route has one of the cases, drawn, instead of all.
     pictures : bool
         Whether to draw them, unless ``output.pictures`` is "none".
 
@@ -189,7 +192,7 @@ def run_global_positioning(
     city = PlainCity(world, seed)
     integrity = config.integrity.of(IntegrityOptions)
     found = run_cases(
-        Batch(city, choice, wanted, 0, runs, fixed, integrity),
+        Batch(city, choice, wanted, 0, runs, fixed, integrity, one_case),
         out,
         workers=workers,
         resume=resume,

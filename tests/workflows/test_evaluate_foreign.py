@@ -244,6 +244,31 @@ def test_faulty_sensors_have_rows_of_their_own_and_one_together(tmp_path):
     assert pooled.claimed == pytest.approx(claimed / epochs)
 
 
+def test_each_route_may_have_one_case_which_is_the_same_as_among_all(tmp_path):
+    """Which one is drawn depends on seed and route alone; cases without a route have no row."""
+    config, fixed = load_foreign(None, UNDRAWN)
+    names = tuple(SENSORS)
+    given = {"runs": 3, "seed": 3, "cases": names, "workers": 1, "fixed": fixed}
+    result = run_foreign(config, "sensors", tmp_path / "one", one_case=True, **given)
+    *each, pooled = result.cases
+    files = sorted((tmp_path / "one" / "batches").glob("*.json"))
+    rows = [row for file in files for row in json.loads(file.read_text())["rows"]]
+    assert [row["route"] for row in rows] == [0, 1, 2]
+    drawn = [row["case"] for row in rows]
+    assert [case.name for case in each] == [name for name in names if name in drawn]
+    assert sum(case.runs for case in each) == 3
+    assert pooled.runs == sum(name != "no-fault" for name in drawn)
+    world = replace(prepare(World.of(config), "sensors", tmp_path, 3, names, 3)[0], length_m=250.0)
+    whole = Batch(world, filter_choice(config.filter), names, 0, 3, one_case=True)
+    assert [whole.cases_on(route) for route in range(3)] == [(name,) for name in drawn]
+    assert len({whole.cases_on(route) for route in range(200)}) == len(names)
+    alone = replace(whole, cases=(drawn[1],), first=1, end=2, one_case=False, fixed=fixed)
+    (same,) = run_benchmark(alone, tmp_path / "alone")
+    assert {**same, "seconds": 0} == {**rows[1], "seconds": 0}
+    with pytest.raises(ConfigError, match="one_case"):
+        run_foreign(config, "sensors", tmp_path / "one", resume=True, **given)
+
+
 def test_cases_of_a_walk_share_it_and_faults_change_the_log_only(made):
     world, _ = made
     runs = RouteRuns(replace(world, name="sensors"), 0)

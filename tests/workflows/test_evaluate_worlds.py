@@ -134,6 +134,10 @@ def test_a_world_that_is_not_there_is_refused(tmp_path):
     assert_refused(told, "--world", "audit takes none")
     told = mapfilter("evaluate", "ottawa", "--data", tmp_path, "--world", "easy")
     assert_refused(told, "--world", "ottawa takes none")
+    for name in ("audit", "ottawa", "kitti"):
+        given = () if name == "audit" else ("--data", tmp_path)
+        told = mapfilter("evaluate", name, "--one-case", *given, "--out", out)
+        assert_refused(told, "--one-case", f"{name} takes none")
     assert not out.exists()
 
 

@@ -1,7 +1,7 @@
 """Global positioning from an unknown start, on any map and in any world.
 
 Runs go in batches of a few routes, each with a ground truth of its own; all cases run over the same
-journeys. Finished batches lie on disk, so that what was stopped can go on.
+journeys, or one of them over each. Finished batches lie on disk, so what was stopped can go on.
 """
 
 from __future__ import annotations
@@ -73,6 +73,8 @@ class Batch:
         Options of the filter and errors of dead reckoning that were set for all cases.
     integrity : IntegrityOptions
         Risk and alert limit of the protection levels.
+    one_case : bool
+        Each route has one of the cases, drawn, instead of all.
     """
 
     city: BenchmarkCity
@@ -82,6 +84,14 @@ class Batch:
     end: int
     fixed: frozenset[str] = frozenset()
     integrity: IntegrityOptions = field(default_factory=IntegrityOptions)
+    one_case: bool = False
+
+    def cases_on(self, route: int) -> tuple[str, ...]:
+        """Return the cases that are run on a route."""
+        if not self.one_case:
+            return self.cases
+        rng = named_rng(self.city.seed, "case", str(route))
+        return (self.cases[int(rng.integers(len(self.cases)))],)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +109,7 @@ def run_batch(batch: Batch) -> list[Row]:
     rows: list[Row] = []
     for route in range(batch.first, batch.end):
         runs = batch.city.on_route(route, batch.fixed)
-        for name in batch.cases:
+        for name in batch.cases_on(route):
             one = located_run(batch, runs, name, route)
             row = {**score(one.case, one.walked, one.found, batch.integrity), "route": route}
             from_s = runs.window_from_s(one.case, one.walked)
@@ -171,6 +181,7 @@ def run_benchmark(
         "seed": whole.city.seed,
         "fixed": sorted(whole.fixed),
         "integrity": repr(whole.integrity),
+        "one_case": whole.one_case,
         "world": whole.city.sha256,
     }
     folder = out / BATCHES
@@ -180,7 +191,7 @@ def run_benchmark(
     for first in range(whole.first, whole.end, ROUTES_PER_BATCH):
         batch = replace(whole, first=first, end=min(first + ROUTES_PER_BATCH, whole.end))
         parts.append(folder / f"{first:06d}.json")
-        count = (batch.end - batch.first) * len(batch.cases)
+        count = sum(len(batch.cases_on(route)) for route in range(batch.first, batch.end))
         if not (resume and len(_rows(parts[-1])) == count):
             tasks.append((parts[-1], batch))
     results = ordered_results(

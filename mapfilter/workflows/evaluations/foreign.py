@@ -116,6 +116,7 @@ def run_foreign(
     resume: bool = False,
     progress: Progress | None = None,
     fixed: frozenset[str] = frozenset(),
+    one_case: bool = False,
 ) -> EvaluateResult:
     """Predict, build, and run the cases of a foreign world on a map.
 
@@ -124,7 +125,7 @@ def run_foreign(
     config, fixed
         From :func:`load_foreign`.
     world : {"foreign", "harsh", "sensors"}
-    out, runs, seed, workers, resume, progress
+    out, runs, seed, workers, resume, progress, one_case
         As for :func:`mapfilter.workflows.evaluate.run_global_positioning`.
     cases : sequence of str
         Of the world; all if there is none.
@@ -144,7 +145,7 @@ def run_foreign(
         made = replace(made, length_m=config.journeys.length_m)
     integrity = config.integrity.of(IntegrityOptions)
     found = run_cases(
-        Batch(made, choice, wanted, 0, runs, fixed, integrity),
+        Batch(made, choice, wanted, 0, runs, fixed, integrity, one_case),
         out,
         workers=workers,
         resume=resume,

@@ -71,14 +71,16 @@ def run_cases(
             resume=resume,
             progress=progress,
         )
-        by_case = {name: [row for row in rows if row["case"] == name] for name in whole.cases}
+        of_all = {name: [row for row in rows if row["case"] == name] for name in whole.cases}
+        # Of few routes with one case each, some cases have none.
+        by_case = {name: found for name, found in of_all.items() if found}
         results = [
-            summarise(whole.city.case(name), whole.choice.name, by_case[name])
-            for name in whole.cases
+            summarise(whole.city.case(name), whole.choice.name, found)
+            for name, found in by_case.items()
         ]
         if base is not None:
             draw_cases(whole, by_case, results, base, out / PICTURES, executor)
-    together = [name for name in whole.cases if name in pooled]
+    together = [name for name in by_case if name in pooled]
     if len(together) > 1:
         every = [row for name in together for row in by_case[name]]
         results.append(summarise(Case(POOLED), whole.choice.name, every))
@@ -110,7 +112,7 @@ def draw_cases(
     """
     made = [folder / "coverage.png"]
     save(_coverage(results), made[0])
-    names = [name for name in whole.cases if rows[name]]
+    names = list(rows)
     limit_m = whole.integrity.alert_limit_m
     for name in names:
         known = [row for row in rows[name] if row["available"] is not None]
@@ -121,7 +123,8 @@ def draw_cases(
         save(plot_stanford(bins, counts, limit_m, title=title), made[-1])
     worst = {name: int(worst_row(rows[name])["route"]) for name in names}
     tasks = [
-        replace(whole, cases=(name,), first=route, end=route + 1) for name, route in worst.items()
+        replace(whole, cases=(name,), first=route, end=route + 1, one_case=False)
+        for name, route in worst.items()
     ]
     found = ordered_results(executor or SerialExecutor(), run_again, tasks, in_flight=2)
     for name, (estimate, truth) in zip(names, found, strict=True):
