@@ -89,6 +89,10 @@ def test_a_position_is_claimed_again_after_it_has_agreed_for_some_way():
     assert Recovery(100.0).after(120.0, 20.0, agrees=True) is None
     assert Recovery().after(100.0, 0.0, agrees=True) is None
     assert np.isnan(Recovery(100.0).after(130.0, 20.0, agrees=False).agrees_from_m)
+    doubted = Recovery(100.0, lost=False)
+    assert doubted.after(119.9, 20.0, agrees=True) == doubted
+    assert doubted.after(120.0, 20.0, agrees=True) is None
+    assert doubted.after(130.0, 20.0, agrees=False) == Recovery(130.0, lost=False)
 
 
 def alternative(log_bayes_factor, *places):

@@ -58,7 +58,7 @@ class State:
 
 def judged(
     state, *, weighed=True, positioned=False, contested=False, left=False, unheard=False,
-    by_fixes=-inf, left_share=0.0,
+    by_fixes=-inf, left_share=0.0, used_positions=False,
 ):  # fmt: skip
     rules = SimpleNamespace(claimed_from=0.95, lost_threshold=8.0, converge_log_odds=-12.0)
     beliefs = SimpleNamespace(
@@ -69,6 +69,7 @@ def judged(
         may_have_left=lambda _: left,
         is_unheard=lambda _: unheard,
         log_odds_of_fixes=lambda _: by_fixes,
+        used_positions=lambda _: used_positions,
         left_share=lambda own, watch: left_share if watch is own.watch else 1.0,
     )
     return claims.judged(beliefs, state, weighed=weighed, positioned=positioned)
@@ -138,6 +139,50 @@ def test_what_was_lost_is_claimed_when_it_has_agreed_for_some_way():
         same = judged(given, weighed=False)
         assert same.status is Status.UNCERTAIN
         assert same.recovery is given.recovery
+
+
+def uncertain_before(gone_m, doubted_m, *, mass=0.95):
+    """A position that was not certain enough, so far on."""
+    recovery = Recovery(doubted_m, lost=False)
+    return replace(after_a_loss(gone_m, mass=mass, null=0.0), recovery=recovery)
+
+
+def test_what_was_uncertain_is_claimed_when_it_has_been_certain_for_some_way():
+    """A false certainty is mostly short. The share is that of a claim, not of convergence."""
+    doubt = judged(State(Belief(0.94)))
+    assert (doubt.status, doubt.recovery) == (Status.UNCERTAIN, Recovery(40.0, lost=False))
+    certain = judged(uncertain_before(113.9, 100.0))
+    assert (certain.status, certain.recovery) == (Status.UNCERTAIN, Recovery(100.0, lost=False))
+    # Whether by a reading or not: it is the belief that is not certain.
+    for weighed in (True, False):
+        over = judged(uncertain_before(114.0, 100.0), weighed=weighed)
+        assert (over.status, over.recovery) == (Status.TRACKING, None)
+        anew = judged(uncertain_before(114.0, 100.0, mass=0.94), weighed=weighed)
+        assert (anew.status, anew.recovery) == (Status.UNCERTAIN, Recovery(114.0, lost=False))
+    # A loss meanwhile asks for more.
+    assert judged(uncertain_before(114.0, 100.0), contested=True).recovery == Recovery()
+
+
+def test_a_measured_position_is_claimed_as_soon_as_it_is_certain():
+    doubt = judged(State(Belief(0.94)), positioned=True)
+    assert (doubt.status, doubt.recovery) == (Status.UNCERTAIN, None)
+    found = judged(uncertain_before(100.0, 90.0), positioned=True)
+    assert (found.status, found.recovery) == (Status.TRACKING, None)
+
+
+@pytest.mark.parametrize(
+    ("away_m", "used_positions", "claimed"),
+    [(60.0, False, False), (40.0, False, True), (60.0, True, True)],
+)
+def test_while_an_alternative_elsewhere_is_tested_nothing_is_claimed(
+    away_m, used_positions, claimed
+):
+    """However far behind it is: it has to pay for all places that it might have been in."""
+    place = SimpleNamespace(summary=SimpleNamespace(mean=(0.0, away_m)))
+    other = SimpleNamespace(log_bayes_factor=lambda _: -20.0, belief=place)
+    found = judged(State(At(1.0), alternative=other), used_positions=used_positions)
+    assert found.status is (Status.TRACKING if claimed else Status.UNCERTAIN)
+    assert found.recovery == (None if claimed else Recovery(40.0, lost=False))
 
 
 @pytest.mark.parametrize("status", [Status.LOST, Status.OUTSIDE])

@@ -36,7 +36,13 @@ def in_places(state, *shares):
 UNMEASURED, STANDING = MotionStep(nan, nan), MotionStep(0.0, nan)
 
 
-def statuses(positioner, *sequence, motion=UNMEASURED):
+def gone_on(state, way_m):
+    """The state after a way, with its belief where it was."""
+    reckoning = state.reckoning
+    return replace(state, reckoning=replace(reckoning, travelled_m=reckoning.travelled_m + way_m))
+
+
+def statuses(positioner, *sequence, motion=UNMEASURED, way_m=0.0):
     """Status reported, and that of the belief, after epochs with beliefs of given shares.
 
     The standing of an epoch leaves the belief as it is given.
@@ -44,16 +50,21 @@ def statuses(positioner, *sequence, motion=UNMEASURED):
     rng = np.random.default_rng(1)
     state = positioner.begin_at(500_100.0, 4_500_100.0, 5.0, rng)
     for time_s, shares in enumerate(sequence):
-        epoch = Epoch(float(time_s), (motion,))
+        epoch, state = Epoch(float(time_s), (motion,)), gone_on(state, way_m if time_s else 0.0)
         state, output = positioner.step(in_places(state, *shares), epoch, rng)
         yield output.fix.status, state.belief.status
 
 
 @pytest.mark.parametrize("motion", [UNMEASURED, STANDING])
-def test_a_belief_in_two_places_is_uncertain_until_it_has_gathered(positioner, motion):
+@pytest.mark.parametrize(("way_m", "again"), [(0.0, UNCERTAIN), (20.0, TRACKING)])
+def test_a_belief_in_two_places_is_uncertain_until_it_has_gathered(
+    positioner, motion, way_m, again
+):
+    """And has been certain for some way since."""
     leading = 0.85, 0.97, 0.9, 0.55, 0.97
-    found = list(statuses(positioner, *((x, 1 - x) for x in leading), motion=motion))
-    reported = UNCERTAIN, TRACKING, UNCERTAIN, UNCERTAIN, TRACKING
+    shares = ((x, 1 - x) for x in leading)
+    found = list(statuses(positioner, *shares, motion=motion, way_m=way_m))
+    reported = UNCERTAIN, again, UNCERTAIN, UNCERTAIN, again
     assert found == [(status, TRACKING) for status in reported]
 
 
@@ -69,7 +80,8 @@ def test_what_was_uncertain_is_not_held_to_the_rules_of_a_new_search(positioner)
     state = replace(state, null=replace(state.null, log_odds=-0.1))
     state, output = positioner.step(in_places(state, 0.7, 0.3), Epoch(0.0, (UNMEASURED,)), rng)
     assert output.fix.status is UNCERTAIN
-    state, output = positioner.step(in_places(state, 0.99, 0.01), Epoch(2.0, (STANDING,)), rng)
+    state = gone_on(in_places(state, 0.99, 0.01), 20.0)
+    state, output = positioner.step(state, Epoch(2.0, (STANDING,)), rng)
     assert output.fix.status is TRACKING
 
 

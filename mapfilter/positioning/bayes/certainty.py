@@ -5,8 +5,8 @@ what is measured at all. Beside it stand beliefs in which the phone was turned, 
 positions, and an alternative from scratch, each with its odds against the belief. The share of all
 of them together within 50 m is the probability that the position is right. With too low a
 probability a position is reported but not claimed. The null hypothesis has no position, and
-statuses of its own. A position that was lost without a new search is claimed again when it has
-agreed for some way.
+statuses of its own. A position that was lost without a new search, or was not certain enough, is
+claimed again when it has agreed for some way.
 """
 
 from __future__ import annotations
@@ -33,15 +33,19 @@ _NEGLIGIBLE, _CERTAIN = -9.0, 30.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recovery(EqualByValue):
-    """Way over which a position has agreed since it was lost without a new search.
+    """Way over which a position has agreed since it was last not to be claimed.
 
     Parameters
     ----------
     agrees_from_m : float
-        Distance travelled since which the belief agrees; NaN if it does not.
+        Distance travelled since which the belief agrees; NaN if it does not. For what is uncertain
+        it is that of the last doubt.
+    lost : bool
+        Whether it was lost without a new search, and not just uncertain.
     """
 
     agrees_from_m: float = nan
+    lost: bool = True
 
     def after(self, travelled_m: float, hold_m: float, *, agrees: bool) -> Recovery | None:
         """Return it after a reading; None where the belief has agreed for ``hold_m``.
@@ -49,14 +53,14 @@ class Recovery(EqualByValue):
         Examples
         --------
         >>> Recovery().after(100.0, 20.0, agrees=True)
-        Recovery(agrees_from_m=100.0)
+        Recovery(agrees_from_m=100.0, lost=True)
         >>> Recovery(100.0).after(120.0, 20.0, agrees=True) is None
         True
         """
         if not agrees:
-            return Recovery()
+            return Recovery() if self.lost else Recovery(travelled_m, lost=False)
         from_m = self.agrees_from_m if isfinite(self.agrees_from_m) else travelled_m
-        return None if travelled_m - from_m >= hold_m else Recovery(from_m)
+        return None if travelled_m - from_m >= hold_m else Recovery(from_m, self.lost)
 
 
 def certainty(
@@ -90,7 +94,7 @@ def certainty(
         log_odds = lead - rules.lost_threshold
         if isfinite(by_fixes):
             log_odds = max(log_odds, by_fixes + lead - alternative.gnss_log_bayes_factor)
-        if log_odds > _NEGLIGIBLE and _apart_m(alternative.belief, main) > NEAR_M:
+        if log_odds > _NEGLIGIBLE and is_elsewhere(alternative, main):
             total += exp(min(log_odds, _CERTAIN))
     likely: list[tuple[float, ParticleBelief]] = []
     if isinstance(main, ParticleBelief):
@@ -102,10 +106,10 @@ def certainty(
     return (near + sum(odds * _share_near(one, main) for odds, one in likely)) / total
 
 
-def _apart_m(one: MapBelief, other: MapBelief) -> float:
-    """Return the distance of the leading hypotheses."""
-    own, mean = one.summary.mean, other.summary.mean
-    return hypot(own[0] - mean[0], own[1] - mean[1])
+def is_elsewhere(alternative: AlternativeHypothesis, main: MapBelief) -> bool:
+    """Return whether the leading hypotheses lie farther than 50 m apart."""
+    own, mean = alternative.belief.summary.mean, main.summary.mean
+    return hypot(own[0] - mean[0], own[1] - mean[1]) > NEAR_M
 
 
 def _share_near(one: ParticleBelief, main: MapBelief) -> float:

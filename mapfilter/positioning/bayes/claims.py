@@ -8,7 +8,8 @@ from math import nan
 from mapfilter._changes import changed
 from mapfilter.filters.contract import Status
 from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
-from mapfilter.positioning.bayes.certainty import Recovery, certainty
+from mapfilter.positioning.bayes.certainty import Recovery, certainty, is_elsewhere
+from mapfilter.positioning.bayes.rivals.alternative import MapBelief
 from mapfilter.positioning.bayes.state import BayesState
 
 
@@ -19,7 +20,8 @@ def judged(
 
     It is LOST while its belief is spread over more than one place: below the mass at which it
     searches again, it has to converge anew. A belief in one place that is not certain enough
-    is UNCERTAIN; so is one that was lost without a new search, until it agrees again.
+    is UNCERTAIN; so is one that was lost without a new search, or was uncertain, until it has
+    agreed for some way.
 
     Parameters
     ----------
@@ -31,30 +33,63 @@ def judged(
         Whether a position or satellites were.
     """
     state = _in_one_place(beliefs, state)
-    belief, rules, recovery = state.belief, beliefs.rules_of(state), state.recovery
+    belief, recovery = state.belief, state.recovery
     if belief is None or belief.status is Status.SEARCHING or positioned:
         recovery = None
     elif _contradicted(beliefs, state):
         recovery = Recovery()
     if belief is not None and state.status is Status.TRACKING:
-        options, enough = beliefs.options_of(state), rules.claimed_from
-        if recovery is not None:
-            enough = max(enough, options.switch_mass)
-        by_fixes = beliefs.log_odds_of_fixes(state)
-        here = 1 - beliefs.left_share(state, state.watch)
-        # What is enough has to be so with the probability of still being there.
-        known = state.alternative, state.rivals, enough / here, by_fixes
-        probability = here * certainty(rules, belief, *known)
-        uncertain = probability < rules.claimed_from
-        if recovery is not None and weighed:
-            travelled_m = state.reckoning.travelled_m
-            # An alternative is in the probability, with its odds.
-            agrees = probability >= options.switch_mass
-            agrees = agrees and state.null.log_odds <= rules.converge_log_odds
-            recovery = recovery.after(travelled_m, options.switch_hold_m, agrees=agrees)
-        if uncertain or recovery is not None:
+        claimed, recovery = _claim(beliefs, state, recovery, weighed=weighed, kept=not positioned)
+        if not claimed:
             return changed(state, status=Status.UNCERTAIN, recovery=recovery)
     return state if recovery is state.recovery else changed(state, recovery=recovery)
+
+
+def _claim(
+    beliefs: BeliefFilters,
+    state: BayesState,
+    recovery: Recovery | None,
+    *,
+    weighed: bool,
+    kept: bool,
+) -> tuple[bool, Recovery | None]:
+    """Return whether a tracked position is claimed, and what it recovers from afterwards.
+
+    What is uncertain is claimed at once when it is certain where ``kept`` is false.
+    """
+    belief, rules, options = state.belief, beliefs.rules_of(state), beliefs.options_of(state)
+    travelled_m = state.reckoning.travelled_m
+    assert belief is not None
+    agreed = rules.claimed_from
+    if recovery is not None and recovery.lost:
+        agreed = max(agreed, options.switch_mass)
+    here = 1 - beliefs.left_share(state, state.watch)
+    # What is enough has to be so with the probability of still being there.
+    by_fixes = beliefs.log_odds_of_fixes(state)
+    known = state.alternative, state.rivals, agreed / here, by_fixes
+    probability = here * certainty(rules, belief, *known)
+    certain = probability >= rules.claimed_from and not _is_tested(beliefs, state, belief)
+    if recovery is None:
+        return certain, None if certain or not kept else Recovery(travelled_m, lost=False)
+    agrees = certain
+    if recovery.lost:
+        # An alternative is in the probability, with its odds.
+        agrees = probability >= options.switch_mass
+        agrees = agrees and state.null.log_odds <= rules.converge_log_odds
+    if weighed or not recovery.lost:
+        recovery = recovery.after(travelled_m, options.switch_hold_m, agrees=agrees)
+    return certain and recovery is None, recovery
+
+
+def _is_tested(beliefs: BeliefFilters, state: BayesState, belief: MapBelief) -> bool:
+    """Return whether an alternative elsewhere is tested, as readings contradicted the belief.
+
+    A search from scratch pays for all places that it might be in. So its odds say little against
+    a belief that went astray, until it has found one. Positions leave no such doubt.
+    """
+    if state.alternative is None or beliefs.used_positions(state):
+        return False
+    return is_elsewhere(state.alternative, belief)
 
 
 def _contradicted(beliefs: BeliefFilters, state: BayesState) -> bool:
