@@ -200,7 +200,7 @@ class _Move:
         elif not isfinite(row.spread_m):
             # An unmeasured way says nothing of the compass.
             self.compass = isfinite(row.heading_rad)
-        self.straight = self.straight.after(row)
+        self.straight = self.straight.after(measured, self.state.hold.step_unit_m)
         if isfinite(row.heading_rad) and row.step_m > 0:
             self.walking_rad = row.heading_rad
         elif isfinite(row.spread_m):
@@ -224,7 +224,7 @@ class _Move:
             known = self.filters, self.state, jump_rad, gone_m, self.own
             self.beliefs = self.beliefs.at_jump(*known, positioned=self.positioned)
             self.straight = NO_DIRECTION
-        elif self.compass and not self.ranged and self.straight.bends(row, self.filters.holds):
+        elif self.compass and not self.ranged and self.straight.bends(measured, self.filters.holds):
             self.finish_leg()
             before_rad, gone_m = self.straight.heading_rad, self.reckoning.travelled_m
             self.beliefs = self.beliefs.at_bend(

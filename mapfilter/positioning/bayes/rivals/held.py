@@ -7,8 +7,9 @@ so that all further headings are off by the jump, one for a phone whose headings
 from there on, and one for a phone that was mirrored before, along an axis of the mirror, where the
 walker has turned to the other side. The difference of their log evidence, with the odds of such an
 event, decides: while one of them is ahead elsewhere, the position is LOST; when it is far ahead, it
-takes over, and headings are read as it reads them. Walks without a jump have no such beliefs. While
-the belief searches, some of its own hypotheses have a turned phone instead
+takes over, and headings are read as it reads them. Slow corners have the last of them, too
+(:mod:`mapfilter.positioning.bayes.rivals.bends`). While the belief searches, some of its own
+hypotheses have a turned phone instead
 (:func:`mapfilter.positioning.bayes.beliefs.belief_changes.turned_at_jump`).
 """
 
@@ -286,7 +287,8 @@ def winner(
 def after_takeover(held: Sequence[HeldOtherwise], best: HeldOtherwise) -> tuple[HeldOtherwise, ...]:
     """Return the others, with odds against the one that has taken over; none is ahead of it yet.
 
-    Those of the same jump no longer tell a half turn: whoever it is, the phone was moved there.
+    Those of the same jump no longer tell a half turn: whoever it is, the phone was moved there. One
+    of a bend has odds as others have, so it is not given up sooner.
     """
     gained = best.log_prior
     return tuple(
@@ -294,6 +296,7 @@ def after_takeover(held: Sequence[HeldOtherwise], best: HeldOtherwise) -> tuple[
             one,
             log_prior=one.log_prior - gained,
             ahead_m=nan,
+            at_bend=False,
             tells_half_turn=one.tells_half_turn and one.start_m != best.start_m,
         )
         for one in held
