@@ -211,3 +211,12 @@ def test_a_corner_is_one_also_while_a_gyroscope_alone_takes_it():
     (before,) = by_turns.held
     assert (by_turns.compass, before.start_m) == (True, pytest.approx(4.0))
     assert before.hold.direction_rad(0.8) == pytest.approx(-0.8, abs=0.3)
+
+
+def test_who_turns_right_round_is_not_told_from_a_mirrored_phone():
+    """A belief that went the same way back took the place of one that might tell."""
+    rival = HeldOtherwise(belief(), Hold(-1.0, 0.5), -6.5, -30.0, at_bend=True)
+    after = at_a_bend(MotionStep(2.0, 0.1 + pi), stepped_s=-90.0, held=(rival,))
+    assert [one.hold for one in after.held] == [rival.hold]
+    # The direction is that of the way back from here on.
+    assert after.straight.way_m == 2.0

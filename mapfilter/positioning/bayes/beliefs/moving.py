@@ -227,9 +227,11 @@ class _Move:
         elif self.compass and not self.ranged and self.straight.bends(measured, self.filters.holds):
             self.finish_leg()
             before_rad, gone_m = self.straight.heading_rad, self.reckoning.travelled_m
-            self.beliefs = self.beliefs.at_bend(
-                self.filters, self.state, before_rad, gone_m, self.own
-            )
+            # Who turns right round goes back the same way, whatever the phone does.
+            if not self.filters.holds.is_around(measured.heading_rad - before_rad):
+                self.beliefs = self.beliefs.at_bend(
+                    self.filters, self.state, before_rad, gone_m, self.own
+                )
             self.straight = NO_DIRECTION
         before, self.reckoning = self.reckoning, self.reckoning.moved(step)
         if self.gathers and isinstance(belief, ParticleBelief) and may_wait(measured):
