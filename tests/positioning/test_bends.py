@@ -204,6 +204,13 @@ def test_steps_in_feet_have_the_direction_of_as_many_metres():
     assert len(move(after, MotionStep(3.0, 1.0))[0].held) == 1
 
 
+def test_a_jump_in_feet_is_one_of_a_row_as_short():
+    """Each second of a walk has more than three feet, so none was."""
+    in_feet = walking(walking_rad=0.1, hold=Hold(step_unit_m=0.3048))
+    assert len(move(in_feet, MotionStep(4.6, 2.0))[0].held) == 3
+    assert move(in_feet, MotionStep(9.9, 2.0))[0].held == ()
+
+
 def test_a_corner_is_one_also_while_a_gyroscope_alone_takes_it():
     """It was one when the compass came back, and began where the way had led by then."""
     known, _, _ = move(walking(straight=walked(*[0.0] * 20)), MotionStep(1.0, 0.0))

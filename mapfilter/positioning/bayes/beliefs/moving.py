@@ -218,17 +218,19 @@ class _Move:
             self.compass, belief = False, self.filters.without_compass(belief, self.rng)
             # What began beside it has headings of a compass.
             self.beliefs = replace(self.beliefs, main=belief, unaided=())
-        if self.compass and not self.ranged and jumps(self.walking_rad, row, self.filters.holds):
+        holds, unit_m = self.filters.holds, self.state.hold.step_unit_m
+        watches = self.compass and not self.ranged
+        if watches and jumps(self.walking_rad, row, holds, unit_m):
             self.finish_leg()
             jump_rad, gone_m = (self.walking_rad, row.heading_rad), self.reckoning.travelled_m
             known = self.filters, self.state, jump_rad, gone_m, self.own
             self.beliefs = self.beliefs.at_jump(*known, positioned=self.positioned)
             self.straight = NO_DIRECTION
-        elif self.compass and not self.ranged and self.straight.bends(measured, self.filters.holds):
+        elif watches and self.straight.bends(measured, holds):
             self.finish_leg()
             before_rad, gone_m = self.straight.heading_rad, self.reckoning.travelled_m
             # Who turns right round goes back the same way, whatever the phone does.
-            if not self.filters.holds.is_around(measured.heading_rad - before_rad):
+            if not holds.is_around(measured.heading_rad - before_rad):
                 self.beliefs = self.beliefs.at_bend(
                     self.filters, self.state, before_rad, gone_m, self.own
                 )

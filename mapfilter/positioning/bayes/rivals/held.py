@@ -90,7 +90,7 @@ class HeldOtherwise:
         return hypot(own[0] - other[0], own[1] - other[1]) > NEAR_M
 
 
-def jumps(before_rad: float, step: MotionStep, rules: HoldRules) -> bool:
+def jumps(before_rad: float, step: MotionStep, rules: HoldRules, unit_m: float = 1.0) -> bool:
     """Return whether the heading of a row is far from that of the row before.
 
     Parameters
@@ -100,11 +100,13 @@ def jumps(before_rad: float, step: MotionStep, rules: HoldRules) -> bool:
     step : MotionStep
         The row, as measured.
     rules : HoldRules
+    unit_m : float
+        Unit of its length.
     """
     if not (rules.watched and isfinite(before_rad) and isfinite(step.heading_rad)):
         return False
     changed = abs(wrap_one_rad(step.heading_rad - before_rad))
-    return 0 < step.step_m <= rules.longest_row_m and changed > radians(rules.jump_deg)
+    return 0 < unit_m * step.step_m <= rules.longest_row_m and changed > radians(rules.jump_deg)
 
 
 def forked(
