@@ -22,7 +22,7 @@ REASONS: Mapping[Reason, str] = {
     Reason.MOTION_STUCK: "no motion, but levels change: a ride, or a sensor that stands still",
     Reason.HEADING_STUCK: "the heading repeats itself while one walks",
     Reason.IMPOSSIBLE_STEP: "a step is longer than anything can go in that time",
-    Reason.PHONE_TURNED: "the heading has jumped as that of a phone that is turned",
+    Reason.PHONE_TURNED: "headings fit better as those of a phone that was turned or mirrored",
     Reason.OTHER_UNIT: "lengths of steps are read in another unit from here on",
     Reason.DELIVERED_TWICE: "the same rows of motion were delivered again",
     Reason.STALE_RADIO: "the modem repeats an old report",

@@ -131,8 +131,9 @@ FAULTS = (
     f"{number(HOLDS.longest_row_m)} m)",
     f"of {HOLDS.particles} to {2 * HOLDS.particles} hypotheses",
     f"Where a jump is less than {number(HOLDS.around_deg)}°",
-    f"more than {number(HOLDS.bend_deg)}° from the direction of the last metres (a mean "
-    f"that falls off by 1/e in {number(bends._MEMORY_M)} m, of {number(bends._LEAST_M)} m or more)",
+    f"more than {number(HOLDS.bend_deg)}°, and less than {number(HOLDS.around_deg)}°, from the "
+    f"direction of the last metres (a mean that falls off by 1/e in "
+    f"{number(bends._MEMORY_M)} m, of {number(bends._LEAST_M)} m or more)",
     f"after {number(held._BEND_M)} m, unless something speaks for it (a Bayes factor of "
     f"{e_to(held.SPEAKS_NATS)} or more), and at one of {e_to(held._BEND_NATS)}.",
     f"odds that a jump is the phone's are {HOLDS.probability:g} to 1",

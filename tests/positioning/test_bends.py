@@ -10,7 +10,8 @@ from noting_filters import TRACKING, Beliefs, belief, move, walking
 from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.positioning.bayes.rivals.alternative import NullHypothesis
 from mapfilter.positioning.bayes.rivals.bends import Straight, mirrored_before, without_earlier
-from mapfilter.positioning.bayes.rivals.held import HeldOtherwise, still_open
+from mapfilter.positioning.bayes.rivals.half_turns import HalfTurns
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise, after_takeover, still_open
 from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
 
@@ -125,6 +126,16 @@ def test_one_that_leads_stays_longest():
     assert still_open(HoldRules(), (rival,), belief(), 1250.0) == ()
 
 
+def test_beside_a_mirrored_phone_that_has_taken_over_one_is_as_likely():
+    """It was dropped at the next bend, with odds of 1 to 1."""
+    best, other = (HeldOtherwise(belief(log_evidence=20.0), Hold(-1.0, axis_rad), -6.5, 50.0,
+                                 at_bend=True) for axis_rad in (0.0, 1.0))  # fmt: skip
+    (left,) = after_takeover((best, other), best)
+    assert left.log_odds(best.belief) == 0.0
+    assert without_earlier((left,), best.belief) == (left,)
+    assert len(still_open(HoldRules(), (left,), belief(log_evidence=23.9), 449.0)) == 1
+
+
 def at_a_bend(raw, *, status=TRACKING, rules=None, **changes):
     """The state after a row of a tracked walk that went at 0.1 rad so far."""
     straight = walked(*[np.degrees(0.1)] * 20)
@@ -170,3 +181,49 @@ def test_a_jump_has_it_among_its_own_and_begins_a_way():
 def test_who_has_stood_may_turn_to_the_other_side_too():
     (before,) = at_a_bend(MotionStep(2.0, 2.0), stepped_s=-90.0).held
     assert before.hold.direction_rad(2.0) == pytest.approx(0.1 - 1.9)
+
+
+def test_a_half_turn_whose_rival_is_given_up_at_a_bend_was_the_walkers():
+    """As it is where that is given up at a jump, or at a report."""
+    turned = HeldOtherwise(belief(), Hold(1.0, pi), -1.1, -400.0, tells_half_turn=True)
+    after = at_a_bend(MotionStep(2.0, 1.0), held=(turned,))
+    assert [one.at_bend for one in after.held] == [True]
+    assert after.half_turns == HalfTurns(1 / (1 + exp(-1.1)))
+    # One that goes on beside does not tell yet.
+    open_still = replace(turned, start_m=-399.0)
+    after = at_a_bend(MotionStep(2.0, 1.0), held=(open_still,))
+    assert (len(after.held), after.half_turns) == (2, HalfTurns())
+
+
+def test_steps_in_feet_have_the_direction_of_as_many_metres():
+    in_feet = walking(straight=Straight(), hold=Hold(step_unit_m=0.3048))
+    after, _, _ = move(in_feet, *[MotionStep(3.0, 0.1)] * 8)
+    assert after.straight.way_m == pytest.approx(8 * 0.9144)
+    assert move(after, MotionStep(3.0, 1.0))[0].held == ()
+    after, _, _ = move(after, MotionStep(3.0, 0.1))
+    assert len(move(after, MotionStep(3.0, 1.0))[0].held) == 1
+
+
+def test_a_jump_in_feet_is_one_of_a_row_as_short():
+    """Each second of a walk has more than three feet, so none was."""
+    in_feet = walking(walking_rad=0.1, hold=Hold(step_unit_m=0.3048))
+    assert len(move(in_feet, MotionStep(4.6, 2.0))[0].held) == 3
+    assert move(in_feet, MotionStep(9.9, 2.0))[0].held == ()
+
+
+def test_a_corner_is_one_also_while_a_gyroscope_alone_takes_it():
+    """It was one when the compass came back, and began where the way had led by then."""
+    known, _, _ = move(walking(straight=walked(*[0.0] * 20)), MotionStep(1.0, 0.0))
+    by_turns, _, _ = move(known, *[MotionStep(1.0, nan, 0.2)] * 5)
+    (before,) = by_turns.held
+    assert (by_turns.compass, before.start_m) == (True, pytest.approx(4.0))
+    assert before.hold.direction_rad(0.8) == pytest.approx(-0.8, abs=0.3)
+
+
+def test_who_turns_right_round_is_not_told_from_a_mirrored_phone():
+    """A belief that went the same way back took the place of one that might tell."""
+    rival = HeldOtherwise(belief(), Hold(-1.0, 0.5), -6.5, -30.0, at_bend=True)
+    after = at_a_bend(MotionStep(2.0, 0.1 + pi), stepped_s=-90.0, held=(rival,))
+    assert [one.hold for one in after.held] == [rival.hold]
+    # The direction is that of the way back from here on.
+    assert after.straight.way_m == 2.0

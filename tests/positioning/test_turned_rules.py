@@ -112,6 +112,8 @@ def test_what_a_jump_is():
     assert not jumps(0.0, MotionStep(1.4, np.nan), rules)
     assert not jumps(np.nan, walked, rules)
     assert not jumps(0.0, walked, replace(rules, watched=False))
+    # A row of 3.5 feet is a short one.
+    assert jumps(0.0, far, rules, 0.3048)
 
 
 def test_how_headings_are_read_after_a_jump():

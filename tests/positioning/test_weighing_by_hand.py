@@ -28,6 +28,7 @@ from mapfilter.positioning.bayes.beliefs.new_beliefs import NewBeliefs
 from mapfilter.positioning.bayes.beliefs.path import RecentPath
 from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.rivals.alternative import NullHypothesis
+from mapfilter.positioning.bayes.rivals.bends import Straight
 from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
 from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.sources.evidence import EvidenceUpdate, FixedTerm, RadioReading
@@ -87,9 +88,13 @@ def test_a_belief_is_weighed_and_the_null_hypothesis_beside_it():
     kept = replace(
         STATE, contested=True, walking_rad=0.3, heading_rad=0.2, compass=False, takeovers=4,
         alternatives=5, recovery=Recovery(3.0), hold=Hold(-1.0, 0.5),
+        straight=Straight(3.0, 4.0, 9.0),
     )  # fmt: skip
     found, _ = weighed(state=kept)
-    names = "contested walking_rad heading_rad compass takeovers alternatives recovery hold watch"
+    names = (
+        "contested walking_rad straight heading_rad compass takeovers alternatives recovery hold "
+        "watch"
+    )
     for name in (*names.split(), "path", "reckoning", "reported", "last_fix"):
         assert getattr(found, name) == getattr(kept, name), name
 

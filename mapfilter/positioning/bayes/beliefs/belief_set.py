@@ -175,7 +175,8 @@ class BeliefSet:
             return self
         by = rules, main, state.null, state.hold, straight_rad, travelled_m, white_rad
         beside = (*without_earlier(self.held, main), mirrored_before(*by, own.forking))
-        return replace(self, held=still_open(rules, beside, main, travelled_m))
+        held = still_open(rules, beside, main, travelled_m)
+        return replace(self, held=held, half_turns=self.half_turns.after(beside, held, main))
 
     def _turned_in_search(
         self,

@@ -200,7 +200,7 @@ class _Move:
         elif not isfinite(row.spread_m):
             # An unmeasured way says nothing of the compass.
             self.compass = isfinite(row.heading_rad)
-        self.straight = self.straight.after(row)
+        self.straight = self.straight.after(measured, self.state.hold.step_unit_m)
         if isfinite(row.heading_rad) and row.step_m > 0:
             self.walking_rad = row.heading_rad
         elif isfinite(row.spread_m):
@@ -218,18 +218,22 @@ class _Move:
             self.compass, belief = False, self.filters.without_compass(belief, self.rng)
             # What began beside it has headings of a compass.
             self.beliefs = replace(self.beliefs, main=belief, unaided=())
-        if self.compass and not self.ranged and jumps(self.walking_rad, row, self.filters.holds):
+        holds, unit_m = self.filters.holds, self.state.hold.step_unit_m
+        watches = self.compass and not self.ranged
+        if watches and jumps(self.walking_rad, row, holds, unit_m):
             self.finish_leg()
             jump_rad, gone_m = (self.walking_rad, row.heading_rad), self.reckoning.travelled_m
             known = self.filters, self.state, jump_rad, gone_m, self.own
             self.beliefs = self.beliefs.at_jump(*known, positioned=self.positioned)
             self.straight = NO_DIRECTION
-        elif self.compass and not self.ranged and self.straight.bends(row, self.filters.holds):
+        elif watches and self.straight.bends(measured, holds):
             self.finish_leg()
             before_rad, gone_m = self.straight.heading_rad, self.reckoning.travelled_m
-            self.beliefs = self.beliefs.at_bend(
-                self.filters, self.state, before_rad, gone_m, self.own
-            )
+            # Who turns right round goes back the same way, whatever the phone does.
+            if not holds.is_around(measured.heading_rad - before_rad):
+                self.beliefs = self.beliefs.at_bend(
+                    self.filters, self.state, before_rad, gone_m, self.own
+                )
             self.straight = NO_DIRECTION
         before, self.reckoning = self.reckoning, self.reckoning.moved(step)
         if self.gathers and isinstance(belief, ParticleBelief) and may_wait(measured):

@@ -63,9 +63,12 @@ class Straight(NamedTuple):
             return False
         return abs(wrap_one_rad(apart_rad)) > radians(rules.bend_deg)
 
-    def after(self, step: MotionStep) -> Straight:
-        """Return it with a step; one without a direction changes nothing."""
-        length_m, heading_rad = step.step_m, step.heading_rad
+    def after(self, step: MotionStep, unit_m: float = 1.0) -> Straight:
+        """Return it with a step; one without a direction changes nothing.
+
+        ``unit_m`` is the unit of its length.
+        """
+        length_m, heading_rad = unit_m * step.step_m, step.heading_rad
         if not (length_m > 0 and isfinite(heading_rad)):
             return self
         kept = exp(-length_m / _MEMORY_M)

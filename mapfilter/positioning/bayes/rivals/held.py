@@ -7,8 +7,9 @@ so that all further headings are off by the jump, one for a phone whose headings
 from there on, and one for a phone that was mirrored before, along an axis of the mirror, where the
 walker has turned to the other side. The difference of their log evidence, with the odds of such an
 event, decides: while one of them is ahead elsewhere, the position is LOST; when it is far ahead, it
-takes over, and headings are read as it reads them. Walks without a jump have no such beliefs. While
-the belief searches, some of its own hypotheses have a turned phone instead
+takes over, and headings are read as it reads them. Slow corners have the last of them, too
+(:mod:`mapfilter.positioning.bayes.rivals.bends`). While the belief searches, some of its own
+hypotheses have a turned phone instead
 (:func:`mapfilter.positioning.bayes.beliefs.belief_changes.turned_at_jump`).
 """
 
@@ -89,7 +90,7 @@ class HeldOtherwise:
         return hypot(own[0] - other[0], own[1] - other[1]) > NEAR_M
 
 
-def jumps(before_rad: float, step: MotionStep, rules: HoldRules) -> bool:
+def jumps(before_rad: float, step: MotionStep, rules: HoldRules, unit_m: float = 1.0) -> bool:
     """Return whether the heading of a row is far from that of the row before.
 
     Parameters
@@ -99,11 +100,13 @@ def jumps(before_rad: float, step: MotionStep, rules: HoldRules) -> bool:
     step : MotionStep
         The row, as measured.
     rules : HoldRules
+    unit_m : float
+        Unit of its length.
     """
     if not (rules.watched and isfinite(before_rad) and isfinite(step.heading_rad)):
         return False
     changed = abs(wrap_one_rad(step.heading_rad - before_rad))
-    return 0 < step.step_m <= rules.longest_row_m and changed > radians(rules.jump_deg)
+    return 0 < unit_m * step.step_m <= rules.longest_row_m and changed > radians(rules.jump_deg)
 
 
 def forked(
@@ -286,7 +289,8 @@ def winner(
 def after_takeover(held: Sequence[HeldOtherwise], best: HeldOtherwise) -> tuple[HeldOtherwise, ...]:
     """Return the others, with odds against the one that has taken over; none is ahead of it yet.
 
-    Those of the same jump no longer tell a half turn: whoever it is, the phone was moved there.
+    Those of the same jump no longer tell a half turn: whoever it is, the phone was moved there. One
+    of a bend has odds as others have, so it is not given up sooner.
     """
     gained = best.log_prior
     return tuple(
@@ -294,6 +298,7 @@ def after_takeover(held: Sequence[HeldOtherwise], best: HeldOtherwise) -> tuple[
             one,
             log_prior=one.log_prior - gained,
             ahead_m=nan,
+            at_bend=False,
             tells_half_turn=one.tells_half_turn and one.start_m != best.start_m,
         )
         for one in held
