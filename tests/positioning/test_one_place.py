@@ -148,19 +148,19 @@ def uncertain_before(gone_m, doubted_m, *, mass=0.95):
 
 
 def test_what_was_uncertain_is_claimed_when_it_has_been_certain_for_some_way():
-    """A false certainty is mostly short. The share is that of a claim, not of convergence."""
+    """At a rest only levels tell that it is one. The share is that of a claim."""
     doubt = judged(State(Belief(0.94)))
     assert (doubt.status, doubt.recovery) == (Status.UNCERTAIN, Recovery(40.0, lost=False))
-    certain = judged(uncertain_before(113.9, 100.0))
+    certain = judged(uncertain_before(104.9, 100.0))
     assert (certain.status, certain.recovery) == (Status.UNCERTAIN, Recovery(100.0, lost=False))
     # Whether by a reading or not: it is the belief that is not certain.
     for weighed in (True, False):
-        over = judged(uncertain_before(114.0, 100.0), weighed=weighed)
+        over = judged(uncertain_before(105.0, 100.0), weighed=weighed)
         assert (over.status, over.recovery) == (Status.TRACKING, None)
-        anew = judged(uncertain_before(114.0, 100.0, mass=0.94), weighed=weighed)
-        assert (anew.status, anew.recovery) == (Status.UNCERTAIN, Recovery(114.0, lost=False))
+        anew = judged(uncertain_before(105.0, 100.0, mass=0.94), weighed=weighed)
+        assert (anew.status, anew.recovery) == (Status.UNCERTAIN, Recovery(105.0, lost=False))
     # A loss meanwhile asks for more.
-    assert judged(uncertain_before(114.0, 100.0), contested=True).recovery == Recovery()
+    assert judged(uncertain_before(105.0, 100.0), contested=True).recovery == Recovery()
 
 
 def test_a_measured_position_is_claimed_as_soon_as_it_is_certain():

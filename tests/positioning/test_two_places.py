@@ -56,7 +56,7 @@ def statuses(positioner, *sequence, motion=UNMEASURED, way_m=0.0):
 
 
 @pytest.mark.parametrize("motion", [UNMEASURED, STANDING])
-@pytest.mark.parametrize(("way_m", "again"), [(0.0, UNCERTAIN), (20.0, TRACKING)])
+@pytest.mark.parametrize(("way_m", "again"), [(0.0, UNCERTAIN), (5.0, TRACKING)])
 def test_a_belief_in_two_places_is_uncertain_until_it_has_gathered(
     positioner, motion, way_m, again
 ):
@@ -80,7 +80,7 @@ def test_what_was_uncertain_is_not_held_to_the_rules_of_a_new_search(positioner)
     state = replace(state, null=replace(state.null, log_odds=-0.1))
     state, output = positioner.step(in_places(state, 0.7, 0.3), Epoch(0.0, (UNMEASURED,)), rng)
     assert output.fix.status is UNCERTAIN
-    state = gone_on(in_places(state, 0.99, 0.01), 20.0)
+    state = gone_on(in_places(state, 0.99, 0.01), 5.0)
     state, output = positioner.step(state, Epoch(2.0, (STANDING,)), rng)
     assert output.fix.status is TRACKING
 

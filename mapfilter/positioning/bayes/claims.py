@@ -12,6 +12,10 @@ from mapfilter.positioning.bayes.certainty import Recovery, certainty, is_elsewh
 from mapfilter.positioning.bayes.rivals.alternative import MapBelief
 from mapfilter.positioning.bayes.state import BayesState
 
+_AGAIN_M = 5.0
+"""Way from the last doubt on which a position has to be certain: at a rest nothing but levels tells
+whether it is one, and along some streets they do not change."""
+
 
 def judged(
     beliefs: BeliefFilters, state: BayesState, *, weighed: bool, positioned: bool
@@ -71,12 +75,12 @@ def _claim(
     certain = probability >= rules.claimed_from and not _is_tested(beliefs, state, belief)
     if recovery is None:
         return certain, None if certain or not kept else Recovery(travelled_m, lost=False)
-    agrees = certain
-    if recovery.lost:
+    if not recovery.lost:
+        recovery = recovery.after(travelled_m, _AGAIN_M, agrees=certain)
+    elif weighed:
         # An alternative is in the probability, with its odds.
         agrees = probability >= options.switch_mass
         agrees = agrees and state.null.log_odds <= rules.converge_log_odds
-    if weighed or not recovery.lost:
         recovery = recovery.after(travelled_m, options.switch_hold_m, agrees=agrees)
     return certain and recovery is None, recovery
 
