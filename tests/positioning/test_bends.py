@@ -237,3 +237,12 @@ def test_a_corner_that_satellites_have_seen_is_none_afterwards():
     after, _, _ = move(before, *[MotionStep(1.0, 1.5)] * 3, pseudoranges=(seen,))
     assert after.straight == walked(*[np.degrees(1.5)] * 3)
     assert move(after, MotionStep(1.0, 1.5))[0].held == ()
+
+
+@pytest.mark.parametrize(
+    ("nats", "gone_m", "stays"), [(0.0, 99.0, 1), (0.0, 100.0, 0), (-1.0, 9.0, 0)]
+)
+def test_none_stays_longer_than_the_rules_allow(nats, gone_m, stays):
+    rules = HoldRules(abandon_threshold=-1.0, abandon_after_m=100.0)
+    rival = HeldOtherwise(belief(log_evidence=nats), Hold(-1.0), -6.5, 50.0, at_bend=True)
+    assert len(still_open(rules, (rival,), belief(), 50.0 + gone_m)) == stays
