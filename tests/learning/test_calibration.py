@@ -4,8 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 from scipy.stats import norm
 
+from mapfilter.learning import calibration
 from mapfilter.learning.calibration import Calibration, calibrate
 from mapfilter.learning.likelihood import (
     OFFSETS_DB,
@@ -77,6 +79,23 @@ def test_too_few_levels_change_nothing():
     start = Calibration(1.5, -2.0)
     few = np.zeros(5), np.ones(5, dtype=bool), np.zeros(5, dtype=int), np.full(5, 100.0)
     assert calibrate(*few, np.ones(5), 6.0, start) is start
+
+
+def test_derivatives_are_those_of_the_cost(monkeypatch):
+    """Also by the offset of a cell that is a fault; wrong ones end a search in another place."""
+    asked = []
+
+    def searched(cost, first, **options):
+        asked.append((cost, first))
+        return minimize(cost, first, **options)
+
+    monkeypatch.setattr(calibration, "minimize", searched)
+    fitted((0.0, 1.0, 9.0), 40)
+    cost, first = asked[0]
+    for at in (first + 0.5, first + np.array([-3.0, 2.0, 0.1, 4.0, 9.0])):
+        steps = 1e-5 * np.eye(at.size)
+        found = [(cost(at + by)[0] - cost(at - by)[0]) / 2e-5 for by in steps]
+        np.testing.assert_allclose(cost(at)[1], found, rtol=0, atol=1e-6)
 
 
 def test_likelihoods_are_those_of_a_normal_error_with_outliers():

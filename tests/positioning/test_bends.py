@@ -14,6 +14,7 @@ from mapfilter.positioning.bayes.rivals.half_turns import HalfTurns
 from mapfilter.positioning.bayes.rivals.held import HeldOtherwise, after_takeover, still_open
 from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
+from mapfilter.positioning.epochs import Pseudorange
 
 
 def walked(*headings_deg, step_m=1.0):
@@ -227,3 +228,21 @@ def test_who_turns_right_round_is_not_told_from_a_mirrored_phone():
     assert [one.hold for one in after.held] == [rival.hold]
     # The direction is that of the way back from here on.
     assert after.straight.way_m == 2.0
+
+
+def test_a_corner_that_satellites_have_seen_is_none_afterwards():
+    """A rival began beside it, mirrored along the street before, once none came any more."""
+    seen = Pseudorange("G01", 2e7, 5.0, (2e7, 0.0, 0.0))
+    before = walking(straight=walked(*[0.0] * 20))
+    after, _, _ = move(before, *[MotionStep(1.0, 1.5)] * 3, pseudoranges=(seen,))
+    assert after.straight == walked(*[np.degrees(1.5)] * 3)
+    assert move(after, MotionStep(1.0, 1.5))[0].held == ()
+
+
+@pytest.mark.parametrize(
+    ("nats", "gone_m", "stays"), [(0.0, 99.0, 1), (0.0, 100.0, 0), (-1.0, 9.0, 0)]
+)
+def test_none_stays_longer_than_the_rules_allow(nats, gone_m, stays):
+    rules = HoldRules(abandon_threshold=-1.0, abandon_after_m=100.0)
+    rival = HeldOtherwise(belief(log_evidence=nats), Hold(-1.0), -6.5, 50.0, at_bend=True)
+    assert len(still_open(rules, (rival,), belief(), 50.0 + gone_m)) == stays

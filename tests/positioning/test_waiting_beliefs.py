@@ -10,7 +10,7 @@ from made_filters import belief
 from mapfilter.filters.contract import MotionStep, Reason, Status
 from mapfilter.positioning.bayes.sources.usable import UsableEpoch
 from mapfilter.positioning.bayes.state import BayesState, Reported
-from mapfilter.positioning.bayes.waiting import waits
+from mapfilter.positioning.bayes.waiting import report_alone, waits
 from mapfilter.positioning.epochs import Difference, Epoch, GnssFix, Pseudorange, ReportRow
 from mapfilter.positioning.sensors.rest import Rest
 
@@ -103,3 +103,20 @@ def test_what_is_not_certain_enough_waits_too():
 def test_a_belief_that_was_reported_waits():
     reported = Reported(TRACKED.belief, Status.TRACKING, 0.0, None)
     assert rule(TRACKED.with_output(reported))(1e6)
+
+
+def test_while_beliefs_wait_the_report_alone_is_asked_for_why_it_is_not_used():
+    source = SimpleNamespace(name="radio", read=lambda used, _, epoch, __: (used, epoch.time_s))
+    assert report_alone(source, TRACKED, Epoch(7.0, radio=(HEARD,))) == [(40.0, 7.0)]
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        {"gnss": GnssFix(500_300.0, 4_500_300.0)},
+        {"pseudoranges": (Pseudorange("G01", nan, nan, (nan, nan, nan)),)},
+        {"tdoa": (Difference("a", "b", nan),)},
+    ],
+)
+def test_rows_of_other_kinds_are_told_by_their_own_sources(rows):
+    assert report_alone(SimpleNamespace(), TRACKED, Epoch(7.0, **rows)) is None

@@ -137,9 +137,10 @@ class _Move:
         """Begin beliefs beside the main one that this epoch's positions call for."""
         hold, gone_m = self.state.hold, self.reckoning.travelled_m
         if self.ranged:
-            # Pseudoranges are compared with the main belief alone, so there is no doubt of a jump.
+            # Pseudoranges are compared with the main belief alone: headings leave no doubt.
             as_is = (one for one in self.beliefs.held if one.hold.is_as_measured)
             self.beliefs = replace(self.beliefs, held=() if hold.is_as_measured else tuple(as_is))
+            self.straight = NO_DIRECTION
         if self.positioned:
             self.finish_leg()
         filters, null, rivals = self.filters, self.state.null, self.beliefs
