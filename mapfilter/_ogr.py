@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 import zipfile
-import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
@@ -19,6 +18,7 @@ import pyogrio
 
 from mapfilter._inputs import check_file, open_input
 from mapfilter._words import likely_of_no_file
+from mapfilter._zip import ZIP_DAMAGE
 from mapfilter.errors import InputError, MapfilterError, fail
 
 FORMATS = (
@@ -212,7 +212,7 @@ def _in_zip(path: Path, size_bytes: int) -> VectorSource:
                     _check_sheet(path / entry.filename, archive.read(entry))
     except MapfilterError:
         raise
-    except (OSError, EOFError, RuntimeError, ValueError, zipfile.BadZipFile, zlib.error) as error:
+    except ZIP_DAMAGE as error:
         hint = "cut off, or another format under this name"
         raise fail(InputError, str(path), "a ZIP of vector files", error, hint) from error
     return VectorSource(_place_in(path, entries, mains), _OPEN_OPTIONS.get("".join(kinds), {}))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from fuzz_command import Target
 from made_maps import AREA, write_pbf, write_xml
 from made_maps import CRS as MAP_CRS
 from made_recordings import MADE
+from made_workbook import workbook
 
 from mapfilter.config.load import load_config
 from mapfilter.gnss.almanacs import read_yuma
@@ -32,6 +34,7 @@ from mapfilter.tracks.log import make_log
 from mapfilter.tracks.readers.formats import read_recording
 from mapfilter.tracks.store import read_log, write_log
 from mapfilter.workflows.info import run_info
+from mapfilter.workflows.inputs.measured import recorded_rows
 
 CRS = "EPSG:32635"
 LATTICE = Lattice(CRS, 385000.0, 6673000.0, 5.0, 12, 9)
@@ -83,6 +86,12 @@ def _rasters(folder: Path) -> Iterator[Target]:
     head = "NCOLS 9\nNROWS 12\nXLLCORNER 385000\nYLLCORNER 6672940\nCELLSIZE 5\n"
     path.write_text(f"{head}NODATA_VALUE -9999\n{rows}\n")
     yield Target("raster ASCII grid", path, read)
+    own = _new(folder, "raster Planet index")
+    (own / "A1.bin").write_bytes(level.astype(">i2").tobytes())
+    index = own / "index.txt"
+    index.write_text("A1.bin 385000 385045 6672940 6673000 5\n")
+    for path in (index, own / "A1.bin"):
+        yield Target(f"raster Planet {path.name}", path, lambda _: read(index))
     own = _new(folder, "land use")
     table = own / "table.csv"
     table.write_text("class,walkable,value\nroad,1,1\nwater,0,2\n")
@@ -141,6 +150,7 @@ def _tables(folder: Path) -> Iterator[Target]:
         f"S{i},60.17{i},24.94{i},30,55,950,{40 * i}\n" for i in range(9)
     )
     yield Target("cell plan", made("plan.csv", plan), lambda path: read_cell_plan(path, CRS))
+    yield from _placemarks(own)
     cuts = "".join(f"{i} {abs(i - 180) / 9:.1f}\n" for i in range(360))
     head = "NAME one\nFREQUENCY 947\nGAIN 15 dBd\nTILT ELECTRICAL 3\n"
     msi = f"{head}HORIZONTAL 360\n{cuts}VERTICAL 360\n{cuts}"
@@ -148,6 +158,13 @@ def _tables(folder: Path) -> Iterator[Target]:
     rows = "".join(f"S1A,60.17{i},24.94{i},-8{i},2026-05-01T10:00:0{i}Z\n" for i in range(9))
     survey = made("survey.csv", f"cell,lat,lon,level_dbm,time\n{rows}")
     yield Target("measurements", survey, lambda path: read_measurements([path]))
+    names = ("cell", "lat", "lon", "level_dbm", "time")
+    records = [dict(zip(names, line.split(","), strict=True)) for line in rows.splitlines()]
+    drive = made("drive.json", json.dumps(records))
+    yield Target("measurements json", drive, _measured)
+    book = own / "drive.xlsx"
+    book.write_bytes(workbook([[*names], *([*record.values()] for record in records)]))
+    yield Target("measurements xlsx", book, _measured)
     reports = "".join(f"-6{i},-7{i},100,{10 * i},{5 * i}\n" for i in range(9))
     table = made("reports.csv", f"WAP001,WAP002,WAP003,x,y\n{reports}")
     yield Target("fingerprints", table, lambda path: read_fingerprint_table(path, CRS))
@@ -162,3 +179,28 @@ def _tables(folder: Path) -> Iterator[Target]:
         "Af1(s/s): 0.0\nweek: 300\n\n"
     )
     yield Target("almanac", made("almanac.txt", block), read_yuma)
+
+
+def _measured(path: Path) -> None:
+    read_measurements([path], recorded=recorded_rows)
+
+
+def _placemarks(folder: Path) -> Iterator[Target]:
+    data = {"height_m": 30, "eirp_dbm": 55, "frequency_mhz": 950}
+    marks = "".join(
+        f"<Placemark><name>S{i}</name><ExtendedData>"
+        + "".join(
+            f'<Data name="{name}"><value>{value}</value></Data>'
+            for name, value in {**data, "azimuth_deg": 40 * i}.items()
+        )
+        + f"</ExtendedData><Point><coordinates>24.94{i},60.17{i}</coordinates></Point></Placemark>"
+        for i in range(9)
+    )
+    text = f'<kml xmlns="http://www.opengis.net/kml/2.2"><Document>{marks}</Document></kml>'
+    path = folder / "plan.kml"
+    path.write_text(text)
+    yield Target("cell plan kml", path, lambda path: read_cell_plan(path, CRS))
+    path = folder / "plan.kmz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("doc.kml", text)
+    yield Target("cell plan kmz", path, lambda path: read_cell_plan(path, CRS))

@@ -20,6 +20,7 @@ from python_calamine import CalamineError, CalamineWorkbook
 from mapfilter._inputs import first_foreign_byte, read_input, wide_encoding
 from mapfilter._separator_line import without_separator_line
 from mapfilter._words import number_of
+from mapfilter._zip import ZIP_DAMAGE
 from mapfilter.errors import Faults, InputError, MapfilterError, fail
 from mapfilter.radio.placemarks import is_kml, placemark_rows
 
@@ -255,7 +256,7 @@ def _read_workbook(path: Path, data: bytes, what: str) -> Table:
         book = CalamineWorkbook.from_filelike(io.BytesIO(data))
         sheets = book.sheet_names
         cells = book.get_sheet_by_index(0).to_python(skip_empty_area=False) if sheets else []
-    except (CalamineError, zipfile.BadZipFile, ValueError, OSError) as error:
+    except (CalamineError, *ZIP_DAMAGE) as error:
         got = (str(error).splitlines() or [type(error).__name__])[0]
         raise fail(InputError, str(path), expected, got, hint) from error
     texts = ((line, [_text(value) for value in row]) for line, row in enumerate(cells, start=1))
@@ -272,8 +273,7 @@ def _read_workbook(path: Path, data: bytes, what: str) -> Table:
 
 def _kml_of(data: bytes) -> bytes | None:
     """Return the KML in a KMZ; None for another file, such as a workbook, and for a damaged one."""
-    wrong = (zipfile.BadZipFile, zlib.error, OSError, RuntimeError, EOFError)
-    with suppress(*wrong), zipfile.ZipFile(io.BytesIO(data)) as archive:
+    with suppress(*ZIP_DAMAGE), zipfile.ZipFile(io.BytesIO(data)) as archive:
         for member in archive.infolist():
             # The first one is the document, as Google Earth takes it.
             if member.filename.lower().endswith(".kml") and member.file_size <= _LARGEST_BYTES:

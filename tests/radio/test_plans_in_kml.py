@@ -116,6 +116,11 @@ def test_a_damaged_kmz_is_refused(written):
     path.write_bytes(whole[:at] + bytes(20) + whole[at + 20 :])
     with pytest.raises(InputError):
         read_cell_plan(path, CRS)
+    # A directory before the begin of the file.
+    end = whole.rindex(b"PK\x05\x06")
+    path.write_bytes(whole[: end + 16] + (2**31).to_bytes(4, "little") + whole[end + 20 :])
+    with pytest.raises(InputError):
+        read_cell_plan(path, CRS)
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w") as archive:
         archive.writestr("a.txt", "no list")

@@ -151,6 +151,10 @@ def test_faults_of_workbooks(tmp_path):
     for end in range(10, len(data), 37):
         said = refusal(tmp_path, data[:end], "cells.xlsx", layout="atoll")
         assert "a workbook that can be read" in said
+    # The version that its directory asks for, beyond those that there are.
+    at = data.index(b"PK\x01\x02") + 6
+    said = refusal(tmp_path, data[:at] + b"\xf0" + data[at + 1 :], "cells.xlsx", layout="atoll")
+    assert "a workbook that can be read, found zip file version 24.0" in said
     assert "an empty sheet" in refusal(tmp_path, workbook([[""]]), "cells.xlsx")
     said = refusal(tmp_path, workbook(ROWS), "cells.xlsx")
     assert "expected columns of a cell plan (cell, site, lat, lon, …), found TX_ID, " in said

@@ -7,13 +7,13 @@ disk, and names in a ZIP reach no other file.
 from __future__ import annotations
 
 import zipfile
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
 from mapfilter._inputs import open_input
 from mapfilter._words import number_of
+from mapfilter._zip import ZIP_DAMAGE
 from mapfilter.errors import InputError, MapfilterError, fail
 
 _BEGIN = b"PK\x03\x04"
@@ -22,7 +22,6 @@ _WORKBOOKS = frozenset(("[Content_Types].xml",)), frozenset(("mimetype", "conten
 _MOST_FILES = 1000
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _CHECKED_BYTES = 1 << 18
-_DAMAGE = (OSError, EOFError, NotImplementedError, ValueError, zipfile.BadZipFile, zlib.error)
 
 
 def is_zip(path: Path) -> bool:
@@ -133,6 +132,6 @@ def _archive(path: Path) -> Iterator[zipfile.ZipFile]:
     try:
         with open_input(path) as stream, zipfile.ZipFile(stream) as archive:
             yield archive
-    except _DAMAGE as error:
+    except ZIP_DAMAGE as error:
         hint = "cut off, or damaged"
         raise fail(InputError, str(path), "a ZIP that can be read", str(error), hint) from error
