@@ -60,7 +60,9 @@ def test_a_number_for_no_data(folder):
     [
         (f"A1.bin {EDGES}\nC3.bin {EDGES}\n", "index.txt row 2, name: expected the name of a file"),
         (f"../A1.bin {EDGES}\n", "index.txt row 1, name: expected the name of a file"),
-        (f"A1.bin {EDGES}\nA1.bin {EDGES}\n", "each cell once"),
+        (f"A1.bin {EDGES}\nA1.bin {EDGES}\n", "row 2, name: expected each cell once"),
+        (f"A1.bin {EDGES}\nB 2.bin 3850o0 5 5 5 5\n",
+         "row 2: expected a file's name, west, east.*3850o0"),
         (f"A1.bin {WEST_M} {NORTH_M - 100} {WEST_M + 160} {NORTH_M} 20\nB 2.bin 5 1 1 5 20\n",
          "row 2, area: .*another order of columns"),
         (f"A1.bin {EDGES[:-4]}10.0\n", "bytes"),
