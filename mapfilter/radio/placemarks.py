@@ -16,6 +16,8 @@ from mapfilter._words import number_of
 from mapfilter.errors import InputError, fail
 
 _LONGITUDES, _LATITUDES = {"lon", "lon_deg", "longitude"}, {"lat", "lat_deg", "latitude"}
+PLACEMARKS = "placemarks with a point and data"
+"""What is expected of KML that is a table."""
 _MOST_ELEMENTS = 2_000_000
 _HEAD = 1 << 12
 _DAMAGED = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, OSError, RuntimeError, EOFError)
@@ -89,7 +91,7 @@ def read_placemarks(path: Path, text: str) -> tuple[list[dict[str, str]], tuple[
             "write height, azimuth, EIRP and frequency of each cell as its ExtendedData (QGIS does "
             "for the columns of a layer), or export the list as CSV or as a workbook"
         )
-        raise fail(InputError, str(path), "placemarks with a point and data", got, hint)
+        raise fail(InputError, str(path), PLACEMARKS, got, hint)
     notes: tuple[str, ...] = (
         f"{path.name}: KML read as a table of {number_of(len(records), 'placemark')}",
     )
