@@ -170,9 +170,7 @@ def _of_planet(path: Path, lines: Sequence[PlanetLine | Unreadable]) -> tuple[In
         file, cell_id = _within(path.parent, one.name, names), PurePosixPath(one.name).stem
         west, south, east, north = one.area_m
         if file is None:
-            expected = f"the name of a file in {path.parent}"
-            hint = "rasters moved elsewhere, or exported to another folder"
-            faults.add(f"{where}, name", expected, repr(one.name[:80]), hint)
+            faults.add(f"{where}, name", *_absent(path.parent, one.name, names))
         elif wrong := id_fault(cell_id):
             faults.add(f"{where}, name", *wrong)
         elif not (west < east and south < north and one.resolution_m > 0):
@@ -216,18 +214,9 @@ def _rows(
             faults.add(f"{where}, TX_NAME", *wrong)
         path = _within(table.path.parent, given["FILE_NAME"], names)
         if path is None:
-            expected = f"the name of a file in {table.path.parent}"
-            got = repr(given["FILE_NAME"][:80])
-            hint = "rasters moved elsewhere, or exported to another folder"
-            own = re.split(r"[\\/]", given["FILE_NAME"])[-1]
-            if own != given["FILE_NAME"] and (beside := names.get(own.lower())):
-                hint = f"a path of another computer; {beside} is beside the index: "
-                hint += "leave its name alone"
-            if _leads_out(table.path.parent, given["FILE_NAME"], names):
-                got += ", a link out of the folder"
-                hint = "rasters linked instead of copied; links out of the folder are not followed"
-                hint += ", so that inputs reach no other files: copy them, or link the whole folder"
-            faults.add(f"{where}, FILE_NAME", expected, got, hint)
+            faults.add(
+                f"{where}, FILE_NAME", *_absent(table.path.parent, given["FILE_NAME"], names)
+            )
         values: dict[str, float | None] = {}
         for name in _NUMBERS:
             values[name] = table.number(given[name]) if given.get(name) else None
@@ -256,6 +245,19 @@ def _within(folder: Path, name: str, names: dict[str, str]) -> Path | None:
     except (OSError, ValueError):
         return None
     return path if held else None
+
+
+def _absent(folder: Path, name: str, names: dict[str, str]) -> tuple[str, str, str]:
+    """Return what was expected of a name that is none of the folder, what was found, and a hint."""
+    got, hint = repr(name[:80]), "rasters moved elsewhere, or exported to another folder"
+    own = re.split(r"[\\/]", name)[-1]
+    if own != name and (beside := names.get(own.lower())):
+        hint = f"a path of another computer; {beside} is beside the index: leave its name alone"
+    if _leads_out(folder, name, names):
+        got += ", a link out of the folder"
+        hint = "rasters linked instead of copied; links out of the folder are not followed"
+        hint += ", so that inputs reach no other files: copy them, or link the whole folder"
+    return f"the name of a file in {folder}", got, hint
 
 
 def _leads_out(folder: Path, name: str, names: dict[str, str]) -> bool:

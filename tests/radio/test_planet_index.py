@@ -73,6 +73,18 @@ def test_faults_of_an_index(folder, index, told):
         opened(folder(index))
 
 
+def test_paths_and_links_are_told_as_such(folder, tmp_path_factory):
+    """They were called rasters that were moved elsewhere, unlike in an index of Atoll."""
+    with pytest.raises(InputError, match=r"A1.bin is beside the index: leave its name alone"):
+        opened(folder(f"C:\\maps\\A1.bin {EDGES}\n"))
+    path = folder(f"L.bin {EDGES}\n")
+    other = tmp_path_factory.mktemp("other") / "X.bin"
+    other.write_bytes(b"")
+    (path / "L.bin").symlink_to(other)
+    with pytest.raises(InputError, match="a link out of the folder"):
+        opened(path)
+
+
 def test_another_text_is_no_index(folder):
     """A list of words and numbers beside rasters that are named by themselves."""
     path = folder("made on 2026 5 1 by hand\n", names=())
