@@ -22,7 +22,7 @@ from mapfilter._separator_line import without_separator_line
 from mapfilter._words import number_of
 from mapfilter._zip import ZIP_DAMAGE
 from mapfilter.errors import Faults, InputError, MapfilterError, fail
-from mapfilter.radio.placemarks import is_kml, placemark_rows
+from mapfilter.radio.placemarks import is_kml, kml_in, read_placemarks
 
 _LARGEST_BYTES = 1 << 26
 _LARGEST_UNPACKED_BYTES = 1 << 29
@@ -123,7 +123,7 @@ def read_table(path: Path, what: str) -> Table:
     data = read_input(path, _LARGEST_BYTES, what)
     if data.startswith(_GZIP):
         data = _unpacked(path, data, what)
-    if data.startswith(b"PK") and (kml := _kml_of(data)) is not None:
+    if data.startswith(b"PK") and (kml := kml_in(path, data, _LARGEST_BYTES)) is not None:
         data = kml
     if data.startswith(_WORKBOOKS):
         return _read_workbook(path, data, what)
@@ -271,23 +271,16 @@ def _read_workbook(path: Path, data: bytes, what: str) -> Table:
     return Table(path, "", tuple(lines[0][1]), tuple(lines[1:]), (note, *titles))
 
 
-def _kml_of(data: bytes) -> bytes | None:
-    """Return the KML in a KMZ; None for another file, such as a workbook, and for a damaged one."""
-    with suppress(*ZIP_DAMAGE), zipfile.ZipFile(io.BytesIO(data)) as archive:
-        for member in archive.infolist():
-            # The first one is the document, as Google Earth takes it.
-            if member.filename.lower().endswith(".kml") and member.file_size <= _LARGEST_BYTES:
-                return archive.read(member)
-    return None
-
-
 def _read_placemarks(path: Path, text: str, notes: tuple[str, ...], what: str) -> Table:
-    header, rows, told = placemark_rows(path, text)
+    records, told = read_placemarks(path, text)
+    header = [*dict.fromkeys(name for record in records for name in record)]
     if len(header) > MOST_COLUMNS:
         expected = f"{what} of at most {MOST_COLUMNS} columns"
         raise fail(InputError, f"{path}, header", expected, len(header), "another file")
-    if len(header) * len(rows) > MOST_FIELDS:
-        raise _too_large(path, what, len(rows))
+    # A few names for each of many placemarks would be too many fields for the memory.
+    if len(header) * len(records) > MOST_FIELDS:
+        raise _too_large(path, what, len(records))
+    rows = ([record.get(name, "") for name in header] for record in records)
     return Table(path, "", tuple(header), tuple(enumerate(rows, start=1)), (*notes, *told))
 
 

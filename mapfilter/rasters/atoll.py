@@ -22,7 +22,7 @@ from mapfilter.errors import Faults, InputError, fail
 from mapfilter.lattice import Lattice
 from mapfilter.radio.cell_rules import id_fault
 from mapfilter.radio.tables import Table, read_table
-from mapfilter.rasters.planet import BITS, HEADER, PlanetLine, planet_lines
+from mapfilter.rasters.planet import BITS, HEADER, PlanetLine, Unreadable, planet_lines
 
 INDEX_COLUMNS = ("TX_NAME", "FILE_NAME")
 """Columns that make a table an index of rasters."""
@@ -127,7 +127,7 @@ def read_index(path: Path) -> tuple[IndexRow, ...]:
         not there, numbers that cannot be read, an id given twice.
     """
     if not _is_listed(path) and (lines := planet_lines(path)):
-        return _once_each(_of_planet(path, lines))
+        return _once_each(_of_planet(path, lines), "name", Faults())
     table = read_table(path, "an index of rasters")
     header = [name.strip('" ').upper() for name in table.header]
     faults = Faults()
@@ -141,34 +141,36 @@ def read_index(path: Path) -> tuple[IndexRow, ...]:
         raise fail(InputError, str(path), "at least one raster", "a header without rows")
     names = {file.name.lower(): file.name for file in path.parent.iterdir()}
     rows = tuple(_rows(table, header, names, faults))
-    return _once_each(rows, faults)
+    return _once_each(rows, "TX_NAME", faults)
 
 
-def _once_each(rows: tuple[IndexRow, ...], faults: Faults | None = None) -> tuple[IndexRow, ...]:
+def _once_each(rows: tuple[IndexRow, ...], column: str, faults: Faults) -> tuple[IndexRow, ...]:
     """Return rows of which none has the cell of another one; raise the faults otherwise."""
-    faults = faults or Faults()
     first: dict[str, str] = {}
     for row in rows:
         if row.cell_id in first:
             hint = "rows of several runs; keep one"
             got = f"{row.cell_id!r}, as in {first[row.cell_id]}"
-            faults.add(f"{row.where}, TX_NAME", "each cell once", got, hint)
+            faults.add(f"{row.where}, {column}", "each cell once", got, hint)
         first.setdefault(row.cell_id, row.where)
     faults.raise_if_any(InputError)
     return rows
 
 
-def _of_planet(path: Path, lines: Sequence[PlanetLine]) -> tuple[IndexRow, ...]:
+def _of_planet(path: Path, lines: Sequence[PlanetLine | Unreadable]) -> tuple[IndexRow, ...]:
     faults, rows = Faults(), list[IndexRow]()
     names = {file.name.lower(): file.name for file in path.parent.iterdir()}
     for one in lines:
         where = f"{path} row {one.line}"
+        if isinstance(one, Unreadable):
+            expected = "a file's name, west, east, south, north and side of a pixel"
+            hint = "a number that is left out, or not written as 385000.5"
+            faults.add(where, expected, repr(one.text[:80]), hint)
+            continue
         file, cell_id = _within(path.parent, one.name, names), PurePosixPath(one.name).stem
         west, south, east, north = one.area_m
         if file is None:
-            expected = f"the name of a file in {path.parent}"
-            hint = "rasters moved elsewhere, or exported to another folder"
-            faults.add(f"{where}, name", expected, repr(one.name[:80]), hint)
+            faults.add(f"{where}, name", *_absent(path.parent, one.name, names))
         elif wrong := id_fault(cell_id):
             faults.add(f"{where}, name", *wrong)
         elif not (west < east and south < north and one.resolution_m > 0):
@@ -212,18 +214,9 @@ def _rows(
             faults.add(f"{where}, TX_NAME", *wrong)
         path = _within(table.path.parent, given["FILE_NAME"], names)
         if path is None:
-            expected = f"the name of a file in {table.path.parent}"
-            got = repr(given["FILE_NAME"][:80])
-            hint = "rasters moved elsewhere, or exported to another folder"
-            own = re.split(r"[\\/]", given["FILE_NAME"])[-1]
-            if own != given["FILE_NAME"] and (beside := names.get(own.lower())):
-                hint = f"a path of another computer; {beside} is beside the index: "
-                hint += "leave its name alone"
-            if _leads_out(table.path.parent, given["FILE_NAME"], names):
-                got += ", a link out of the folder"
-                hint = "rasters linked instead of copied; links out of the folder are not followed"
-                hint += ", so that inputs reach no other files: copy them, or link the whole folder"
-            faults.add(f"{where}, FILE_NAME", expected, got, hint)
+            faults.add(
+                f"{where}, FILE_NAME", *_absent(table.path.parent, given["FILE_NAME"], names)
+            )
         values: dict[str, float | None] = {}
         for name in _NUMBERS:
             values[name] = table.number(given[name]) if given.get(name) else None
@@ -252,6 +245,19 @@ def _within(folder: Path, name: str, names: dict[str, str]) -> Path | None:
     except (OSError, ValueError):
         return None
     return path if held else None
+
+
+def _absent(folder: Path, name: str, names: dict[str, str]) -> tuple[str, str, str]:
+    """Return what was expected of a name that is none of the folder, what was found, and a hint."""
+    got, hint = repr(name[:80]), "rasters moved elsewhere, or exported to another folder"
+    own = re.split(r"[\\/]", name)[-1]
+    if own != name and (beside := names.get(own.lower())):
+        hint = f"a path of another computer; {beside} is beside the index: leave its name alone"
+    if _leads_out(folder, name, names):
+        got += ", a link out of the folder"
+        hint = "rasters linked instead of copied; links out of the folder are not followed"
+        hint += ", so that inputs reach no other files: copy them, or link the whole folder"
+    return f"the name of a file in {folder}", got, hint
 
 
 def _leads_out(folder: Path, name: str, names: dict[str, str]) -> bool:

@@ -24,7 +24,10 @@ _LONGEST_BYTES = 1 << 24
 
 
 class PlanetLine(NamedTuple):
-    """A line of an index: its number, a file's name, its edges and the side of its pixels."""
+    """A line of an index: its number, a file's name, its edges and the side of its pixels.
+
+    ``area_m`` are the western, southern, eastern and northern edges.
+    """
 
     line: int
     name: str
@@ -32,8 +35,19 @@ class PlanetLine(NamedTuple):
     resolution_m: float
 
 
-def planet_lines(path: Path) -> tuple[PlanetLine, ...]:
-    """Return the lines of an index of Planet; none where a file is no such index."""
+class Unreadable(NamedTuple):
+    """A line of an index that lacks a number: its number and its text."""
+
+    line: int
+    text: str
+
+
+def planet_lines(path: Path) -> tuple[PlanetLine | Unreadable, ...]:
+    """Return the lines of an index of Planet; none where a file is no such index.
+
+    It is one where at least half of the lines are such: a slip in one does not make it another
+    file.
+    """
     try:
         with open_input(path) as stream:
             data = stream.read(_LONGEST_BYTES + 1)
@@ -41,24 +55,20 @@ def planet_lines(path: Path) -> tuple[PlanetLine, ...]:
         return ()
     if len(data) > _LONGEST_BYTES or b"\0" in data:
         return ()
-    try:
-        return tuple(_lines(data.decode("utf-8-sig", "replace")))
-    except ValueError:
-        return ()
+    lines = tuple(_lines(data.decode("utf-8-sig", "replace")))
+    read = sum(isinstance(one, PlanetLine) for one in lines)
+    return lines if read and 2 * read >= len(lines) else ()
 
 
-def _lines(text: str) -> Iterator[PlanetLine]:
+def _lines(text: str) -> Iterator[PlanetLine | Unreadable]:
     for line, content in enumerate(text.splitlines(), start=1):
         if not content.strip():
             continue
         # Names may have blanks.
         name, *texts = content.strip().rsplit(None, _NUMBERS)
-        west, east, south, north, side_m = map(_metres, texts)
+        values = [value for value in map(number, texts) if value is not None]
+        if len(values) < _NUMBERS:
+            yield Unreadable(line, content.strip())
+            continue
+        west, east, south, north, side_m = values
         yield PlanetLine(line, name.strip('"'), (west, south, east, north), side_m)
-
-
-def _metres(text: str) -> float:
-    value = number(text)
-    if value is None:
-        raise ValueError(f"expected a number, found {text!r}")
-    return value

@@ -78,7 +78,7 @@ def run_check(config: Config, progress: Progress | None = None) -> CheckResult:
     lattice = rasters.lattice if rasters is not None else area
     if area is not None and not placed:
         lattice = None
-    plan = check.plan(lattice)
+    plan = check.plan(lattice, rasters)
     if plan is not None:
         check_identities(plan, check.plan_name, findings)
     done(2)
@@ -89,7 +89,7 @@ def run_check(config: Config, progress: Progress | None = None) -> CheckResult:
         check_power((), plan, check.plan_name, findings)
     ground_truth = check.ground_truth() if area is not None else None
     if ground_truth is not None and check.overlaps(ground_truth):
-        check.check_rasters(ground_truth, check.plan(ground_truth.lattice))
+        check.check_rasters(ground_truth, check.plan(ground_truth.lattice, rasters))
     done(3)
     if plan is not None and lattice is not None:
         # Rasters that are there already do not need the antennas, be they readable or not.
@@ -190,7 +190,7 @@ class _Checks:
     def overlaps(self, rasters: RxLevRasters) -> bool:
         return not self._is_placed or check_rasters_place(rasters, self.config, self.findings)
 
-    def plan(self, lattice: Lattice | None) -> CellPlan | None:
+    def plan(self, lattice: Lattice | None, rasters: RxLevRasters | None) -> CellPlan | None:
         surveyed_plan = self.config.surveyed_plan
         if not self.config.database.cells:
             return None
@@ -205,8 +205,9 @@ class _Checks:
                             f"{note[:1].upper()}{note[1:]}.",
                             "warning",
                         )
-                of_eirp = self.config.rasters.path is None or self.config.rasters.quantity == "loss"
-                if surveyed_plan is None and of_eirp:
+                given = self.config.rasters
+                quantity = given.quantity if rasters is None else rasters.quantity
+                if surveyed_plan is None and (given.path is None or quantity == "loss"):
                     check_carrier_power(plan, self.plan_name, self.findings)
                 return plan
         return None

@@ -153,13 +153,8 @@ def _file_info(path: Path) -> dict[str, Any]:
     if suffix in _TABLES and _INDEX_COLUMN not in _first_line(path):
         return _table_info(path)
     of_kml = begin.lstrip().startswith(b"<") and b"<kml" in begin[:_HEAD_BYTES].lower()
-    if (of_kml and b"<ExtendedData" in begin) or suffix == ".kmz":
-        return _table_info(path)
-    if of_kml:
-        hint = (
-            "export the places of cells as CSV, and a journey with its times (gx:Track) or as GPX"
-        )
-        raise fail(InputError, str(path), _EXPECTED, "KML without times", hint)
+    if of_kml or suffix == ".kmz":
+        return _kml_info(path)
     from mapfilter.workflows.descriptions.geo import raster_info, tiff_info
 
     if suffix in (".tif", ".tiff"):
@@ -196,6 +191,20 @@ def _recordings_info(formats: Sequence[str], use: str) -> dict[str, Any]:
     counts = {name: formats.count(name) for name in sorted(set(formats))}
     held = {"kind": "recordings", "files": len(formats), "formats": counts}
     return {**held, "use": use}
+
+
+def _kml_info(path: Path) -> dict[str, Any]:
+    from mapfilter.radio.placemarks import PLACEMARKS
+
+    try:
+        return _table_info(path)
+    except InputError as error:
+        if all(fault.expected != PLACEMARKS for fault in error.faults):
+            raise
+        hint = (
+            "export the places of cells as CSV, and a journey with its times (gx:Track) or as GPX"
+        )
+        raise fail(InputError, str(path), _EXPECTED, "KML without times", hint) from error
 
 
 def _table_info(path: Path) -> dict[str, Any]:

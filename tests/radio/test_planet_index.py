@@ -60,7 +60,9 @@ def test_a_number_for_no_data(folder):
     [
         (f"A1.bin {EDGES}\nC3.bin {EDGES}\n", "index.txt row 2, name: expected the name of a file"),
         (f"../A1.bin {EDGES}\n", "index.txt row 1, name: expected the name of a file"),
-        (f"A1.bin {EDGES}\nA1.bin {EDGES}\n", "each cell once"),
+        (f"A1.bin {EDGES}\nA1.bin {EDGES}\n", "row 2, name: expected each cell once"),
+        (f"A1.bin {EDGES}\nB 2.bin 3850o0 5 5 5 5\n",
+         "row 2: expected a file's name, west, east.*3850o0"),
         (f"A1.bin {WEST_M} {NORTH_M - 100} {WEST_M + 160} {NORTH_M} 20\nB 2.bin 5 1 1 5 20\n",
          "row 2, area: .*another order of columns"),
         (f"A1.bin {EDGES[:-4]}10.0\n", "bytes"),
@@ -69,6 +71,18 @@ def test_a_number_for_no_data(folder):
 def test_faults_of_an_index(folder, index, told):
     with pytest.raises(InputError, match=told):
         opened(folder(index))
+
+
+def test_paths_and_links_are_told_as_such(folder, tmp_path_factory):
+    """They were called rasters that were moved elsewhere, unlike in an index of Atoll."""
+    with pytest.raises(InputError, match=r"A1.bin is beside the index: leave its name alone"):
+        opened(folder(f"C:\\maps\\A1.bin {EDGES}\n"))
+    path = folder(f"L.bin {EDGES}\n")
+    other = tmp_path_factory.mktemp("other") / "X.bin"
+    other.write_bytes(b"")
+    (path / "L.bin").symlink_to(other)
+    with pytest.raises(InputError, match="a link out of the folder"):
+        opened(path)
 
 
 def test_another_text_is_no_index(folder):

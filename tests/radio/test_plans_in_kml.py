@@ -1,6 +1,7 @@
 """Lists of cells as placemarks of KML and KMZ."""
 
 import io
+import tracemalloc
 import zipfile
 
 import pytest
@@ -82,6 +83,45 @@ def test_areas_and_pins_are_left_out_with_a_note(written):
     assert any("2 placemarks without a point or without data left out" in n for n in plan.notes)
 
 
+def test_metres_of_the_data_come_first(written):
+    """A layer of QGIS has its own east and north beside its points; it was refused for both."""
+    cell = read_cell_plan(written(mark(data(east=385_000, north=6_672_000), POINT)), CRS)["S1A"]
+    assert (cell.east_m, cell.north_m) == (385_000, 6_672_000)
+
+
+def test_empty_data_give_way_to_the_placemark(written):
+    cell = read_cell_plan(written(mark(data(cell="", lat="", lon=""), POINT)), CRS)["S1A"]
+    assert (cell.east_m, cell.north_m) == near(24.94, 60.17)
+
+
+def test_a_page_in_a_description_is_no_entity(written):
+    """It was refused for its own DOCTYPE, which is text here."""
+    page = "<description><![CDATA[<!DOCTYPE html><b>North</b>]]></description>"
+    assert read_cell_plan(written(mark(page, data(), POINT)), CRS).ids == ("S1A",)
+
+
+@pytest.mark.parametrize("comment", ["", "<!-- <kml> -->"])
+def test_entities_are_refused(tmp_path, comment):
+    path, (begin, rest) = tmp_path / "cells.kml", HEAD.format("utf-8").split("?>")
+    many = "".join(f'<!ENTITY a{n + 1} "{f"&a{n};" * 10}">' for n in range(9))
+    doctype = f'{comment}<!DOCTYPE kml [<!ENTITY a0 "x">{many}]>'
+    path.write_text(f"{begin}?>{doctype}{rest}{mark(data(site='&a9;'), POINT)}{END}")
+    with pytest.raises(InputError, match="KML without entities, found a DOCTYPE"):
+        read_cell_plan(path, CRS)
+
+
+def test_names_that_differ_in_each_placemark_do_not_fill_the_memory(written):
+    """Fields grew with the square of the placemarks before their number was looked at."""
+    path = written(*(mark(data(**{f"u{n}": n}), POINT, name=f"S{n}") for n in range(1500)))
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match="at most 1000 columns, found 1507"):
+            read_cell_plan(path, CRS)
+        assert tracemalloc.get_traced_memory()[1] < 12e6
+    finally:
+        tracemalloc.stop()
+
+
 @pytest.mark.parametrize("encoding", ["iso-8859-1", "utf-8", "utf-16"])
 def test_encodings(written, encoding):
     table = read_table(written(mark(data(site="Köln"), POINT), encoding=encoding), "a cell plan")
@@ -98,7 +138,7 @@ def test_encodings(written, encoding):
         ),
         ([], END, "placemarks with a point and data, found none.*export the list as CSV"),
         ([mark(data(), POINT)], "", "whole KML.*cut off, or damaged"),
-        (["<!DOCTYPE kml>", mark(data(), POINT)], END, "KML without entities"),
+        (["<!DOCTYPE kml>", mark(data(), POINT)], END, "whole KML"),
     ],
 )
 def test_what_holds_none_is_refused(written, marks, end, told):
@@ -126,4 +166,27 @@ def test_a_damaged_kmz_is_refused(written):
         archive.writestr("a.txt", "no list")
     path.write_bytes(packed.getvalue())
     with pytest.raises(InputError):
+        read_cell_plan(path, CRS)
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_a_damaged_document_is_told_as_such(tmp_path, method):
+    """A damaged KMZ was called a workbook, and one packed by LZMA ended in a traceback."""
+    path, packed = tmp_path / "cells.kmz", io.BytesIO()
+    with zipfile.ZipFile(packed, "w", method) as archive:
+        archive.writestr("doc.kml", f"{HEAD}{mark(data(), POINT) * 30}{END}")
+    whole = packed.getvalue()
+    at = whole.index(b"doc.kml") + len("doc.kml")
+    path.write_bytes(whole[:at] + bytes(20) + whole[at + 20 :])
+    with pytest.raises(InputError, match="a KMZ that can be read"):
+        read_cell_plan(path, CRS)
+
+
+def test_a_large_document_is_not_passed_over(tmp_path):
+    """The next KML of the archive, such as a legend, was taken for the document."""
+    path = tmp_path / "cells.kmz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("doc.kml", bytes((1 << 26) + 1))
+        archive.writestr("legend.kml", f"{HEAD.format('utf-8')}{mark(data(), POINT)}{END}")
+    with pytest.raises(InputError, match=r"KML of at most 67108864 bytes.*67108865 in 'doc.kml'"):
         read_cell_plan(path, CRS)

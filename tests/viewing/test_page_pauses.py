@@ -73,3 +73,46 @@ def test_the_track_is_cut_there(silent_s, lines):
     MF.drawTrack(pen, run, 0, run.count - 1, {});
     return drawn;"""
     assert ran(task, bundle=found) == lines
+
+
+CHARTS = """const drawn = [];
+const Before = globalThis.uPlot;
+globalThis.uPlot = class extends Before {
+  constructor(options, data, host) {
+    super(options, data, host);
+    drawn.push({ names: options.series.map((one) => one.label), data });
+  }
+};
+MF.start(bundle); draw();
+"""
+
+
+def test_the_error_of_another_run_does_not_go_on_through_its_pause(bundle):
+    """Beside a run with all epochs, its last error was drawn as if it were known."""
+    (late,) = bundle["runs"]
+    count = made.EPOCHS + int(SILENT_S)
+    time_s = np.linspace(0, count - 1, made.EPOCHS)
+    steady = late | {"name": "all", "epochs": late["epochs"] | {"time": packed(time_s, "f8")}}
+    task = """const isOther = (name) => /^error, /.test(name);
+    const { names, data } = drawn.find((one) => one.names.some(isOther));
+    return [data[0], data[names.findIndex(isOther)]];"""
+    found = ran(CHARTS + task, bundle=bundle | {"runs": [steady, late]})
+    at_s, error_m = (np.array(one, dtype=float) for one in found)
+    within = (at_s > LATE) & (at_s < LATE + SILENT_S - 1)
+    assert within.any()
+    assert np.isnan(error_m[within]).all()
+    assert np.isfinite(error_m[~within]).any()
+
+
+def test_a_cell_that_is_received_seldom_has_no_gaps():
+    """Of a cell received every 40 s each stretch was cut, and no line was left."""
+    task = """const page = { active: () => MF.page.active(), clock: String };
+    const times = [0, 40];
+    const series = [{ label: "a cell", values: [1, 2] }];
+    MF.makeChart(page, { title: "levels", data: () => ({ times, series }) }).build();
+    return drawn[drawn.length - 1].data[0];"""
+    run = made.replay_bundle()["runs"][0]
+    time_s = np.linspace(0, 40, made.EPOCHS)
+    often = run | {"epochs": run["epochs"] | {"time": packed(time_s, "f8")}}
+    found = made.replay_bundle() | {"why": None, "runs": [often]}
+    assert ran(CHARTS + task, bundle=found) == [0, 40]

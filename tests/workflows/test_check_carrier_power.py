@@ -36,6 +36,13 @@ def test_before_a_prediction(world):
 
 
 def test_rasters_of_losses_need_it_and_those_of_levels_do_not(world):
+    """Losses whose file states its unit, without a setting, were taken for levels."""
     world.write()
     assert found(world) == []
+    world.quantity = "loss"
+    world.each(lambda levels: 55.0 - levels)
+    world.write()
+    (finding,) = found(world)
+    assert finding["severity"] == "warning"
+    assert found(world, *settings(rasters__quantity="level")) == []
     assert len(found(world, *settings(rasters__quantity="loss"))) == 1

@@ -56,6 +56,16 @@ def test_a_plan_in_kml_is_known(tmp_path):
     (tmp_path / "cells.kml").write_text(kml)
     with zipfile.ZipFile(tmp_path / "cells.kmz", "w") as archive:
         archive.writestr("doc.kml", kml)
-    for name in ("cells.kml", "cells.kmz"):
+    # Styles come first, and there may be more of them than what is looked at.
+    (tmp_path / "styled.kml").write_text(kml.replace("<kml>", f"<kml>{'<Style/>' * 20_000}"))
+    for name in ("cells.kml", "cells.kmz", "styled.kml"):
         found = run_info(tmp_path / name)
         assert (found["kind"], found["use"], found["rows"]) == ("cell plan", "cells.plan", 1)
+
+
+def test_pins_in_kmz_are_told_as_those_in_kml(tmp_path):
+    place = "<Placemark><Point><coordinates>24.9,60.1</coordinates></Point></Placemark>"
+    with zipfile.ZipFile(tmp_path / "pins.kmz", "w") as archive:
+        archive.writestr("doc.kml", f"<kml>{place}</kml>")
+    with pytest.raises(InputError, match="found KML without times"):
+        run_info(tmp_path / "pins.kmz")

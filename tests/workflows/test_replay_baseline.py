@@ -11,6 +11,7 @@ import mapfilter as mf
 from mapfilter.positioning.fingerprints.locating import fit_locator, locate_by, usual_readings
 from mapfilter.positioning.fingerprints.options import Probabilistic
 from mapfilter.positioning.fingerprints.sources import reports_of_database, reports_of_logs
+from mapfilter.workflows.replays import baseline
 from mapfilter.workflows.replays import logs as replay_logs
 from mapfilter.workflows.replays.baseline import MOST_REPORTS, Baselines, SingleReports, together
 
@@ -71,6 +72,28 @@ def test_long_logs_are_thinned(log, world):
     found = Baselines(database, 0).of(long)
     assert found.reports > MOST_REPORTS
     assert (found.tried, found.error_m.size <= MOST_REPORTS) == (MOST_REPORTS, True)
+
+
+def test_the_reports_tried_are_spread_over_the_log_and_held_by_their_95_percent(
+    log, world, monkeypatch
+):
+    database, given = mf.open_database(world.database), mf.read_log(log)
+    reports, most = reports_of_logs([given], database.plan), 20
+    monkeypatch.setattr(baseline, "MOST_REPORTS", most)
+    placed = np.flatnonzero(np.isfinite(reports.east_m) & (np.diff(reports.first) > 0))
+    at = np.linspace(0, placed.size - 1, most).astype(np.int64)
+    assert at[-1] == placed.size - 1 > most
+    tried = reports.some(placed[at])
+    made = Baselines(database, 0)
+    located = locate_by(made._locator(tried), tried)
+    known = np.isfinite(located.error_m)
+    found = made.of(given)
+    np.testing.assert_array_equal(found.error_m, located.error_m[known])
+    np.testing.assert_array_equal(
+        found.within_95, located.error_m[known] <= located.radii_m[known, 2]
+    )
+    # The 50 and 67 % hold fewer.
+    assert (located.error_m[known] <= located.radii_m[known, 1]).sum() < found.within_95.sum()
 
 
 def test_reports_of_several_logs_are_put_together():

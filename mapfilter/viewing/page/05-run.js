@@ -35,6 +35,10 @@
     run.status = (i) => bundle.statuses[epochs.status[i]] ?? "?";
     run.pause = pauseOf(epochs.time, count);
     run.isSilentAfter = (i) => i + 1 < count && epochs.time[i + 1] - epochs.time[i] > run.pause;
+    run.isSilentBetween = (begin, end) => {
+      for (let i = run.at(begin); i + 1 < count && epochs.time[i] < end; i += 1) if (run.isSilentAfter(i)) return true;
+      return false;
+    };
     // Within a pause the status of the epoch before says nothing.
     run.statusAt = (time) => {
       const i = run.at(time);

@@ -93,6 +93,7 @@
     run.status = (i) => bundle.statuses[epochs.status[i]] ?? "waiting";
     run.pause = Infinity;
     run.isSilentAfter = () => false;
+    run.isSilentBetween = () => false;
     run.statusAt = (time) => run.status(run.at(time));
     run.place = (i) => ({ east: epochs.east[i], north: epochs.north[i] });
     run.readingsOf = (i) => rows[i] ?? [];

@@ -56,11 +56,11 @@
     // uPlot draws gaps at null; infinite values would spoil a scale.
     const columns = () => {
       plotted = [times[0], times[times.length - 1]];
-      const { pause } = page.active();
+      const run = page.active();
       const made = [Array.from(times), ...series.map((one) => Array.from(one.values, (value) => (Number.isFinite(value) ? value : null)))];
-      // A line across a pause would be an invention.
+      // A line across a pause would be an invention; a cell may be received seldom without one.
       for (let i = times.length - 1; i > 0; i -= 1) {
-        if (times[i] - times[i - 1] > pause) made.forEach((column, n) => column.splice(i, 0, n ? null : times[i - 1] + 1e-3));
+        if (times[i] - times[i - 1] > run.pause && run.isSilentBetween(times[i - 1], times[i])) made.forEach((column, n) => column.splice(i, 0, n ? null : times[i - 1] + 1e-3));
       }
       return made;
     };

@@ -6,9 +6,9 @@
 
   const others = (page, run, key, label, change = (values) => values) => page.runs.filter((one) => one !== run && some(one.epochs[key]))
     .map((one) => ({ one, label: `${label}, ${one.name}`, values: change(onTimes(one, key, run.epochs.time)) }));
-  // Values of another run at the times of this one.
+  // Values of another run at the times of this one; within its pauses there are none.
   const onTimes = (other, key, times) => Float64Array.from(times, (time) =>
-    (time < other.start - 1 || time > other.end + 1 ? NaN : other.epochs[key][other.at(time)]));
+    (time < other.start - 1 || time > other.end + 1 || other.statusAt(time) === "NO DATA" ? NaN : other.epochs[key][other.at(time)]));
 
   const sureness = (page) => MF.makeChart(page, { title: "Entropy and mass within 50 m", digits: 0, y2: { range: [0, 1.02] },
     format2: (value) => MF.number(100 * value, 0, "%"),
