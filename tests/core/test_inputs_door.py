@@ -344,6 +344,7 @@ ALLOWED = {
     ("tracks/readers/texts/lines.py", "read_csv"),
     ("positioning/fingerprints/tables.py", "read_csv"),
     ("experiments/benchmarks/ottawa_sessions.py", "read_csv"), ("radio/tables.py", "ZipFile"),
+    ("radio/placemarks.py", "ZipFile"),
     ("tracks/readers/texts/zipped.py", "ZipFile"), ("tracks/readers/texts/zipped.py", "open"),
     ("roads/osm_xml.py", "read_dataframe"), ("roads/osm_xml.py", "GzipFile"),
     ("roads/osm_xml.py", "open"),
