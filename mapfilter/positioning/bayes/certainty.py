@@ -15,8 +15,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from math import exp, hypot, inf, isfinite, nan
 
-import numpy as np
-
 from mapfilter._same import EqualByValue
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
@@ -26,6 +24,7 @@ from mapfilter.positioning.bayes.rivals.alternative import (
     MapBelief,
 )
 from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
+from mapfilter.positioning.bayes.rivals.nearby import misplaced_log_odds, share_near
 
 _NEGLIGIBLE, _CERTAIN = -9.0, 30.0
 """Log odds below which a rival is not looked at; bound above which they make no difference."""
@@ -98,23 +97,19 @@ def certainty(
             total += exp(min(log_odds, _CERTAIN))
     likely: list[tuple[float, ParticleBelief]] = []
     if isinstance(main, ParticleBelief):
-        by_log_odds = ((one.log_odds(main), one.belief) for one in rivals)
+        rivals = list(rivals)
+        total += sum(
+            exp(min(misplaced_log_odds(one, main), _CERTAIN)) for one in rivals if one.is_look
+        )
+        by_log_odds = ((one.log_odds(main), one.belief) for one in rivals if not one.is_look)
         likely = [(exp(min(k, _CERTAIN)), one) for k, one in by_log_odds if k > _NEGLIGIBLE]
         total += sum(odds for odds, _ in likely)
     if near / total >= enough:
         return near / total
-    return (near + sum(odds * _share_near(one, main) for odds, one in likely)) / total
+    return (near + sum(odds * share_near(one, main) for odds, one in likely)) / total
 
 
 def is_elsewhere(alternative: AlternativeHypothesis, main: MapBelief) -> bool:
     """Return whether the leading hypotheses lie farther than 50 m apart."""
     own, mean = alternative.belief.summary.mean, main.summary.mean
     return hypot(own[0] - mean[0], own[1] - mean[1]) > NEAR_M
-
-
-def _share_near(one: ParticleBelief, main: MapBelief) -> float:
-    """Return the share of a belief within 50 m of the leading hypothesis of another."""
-    east_m, north_m = main.summary.mean[:2]
-    gone_east_m, gone_north_m = one.state[0] - east_m, one.state[1] - north_m
-    near = gone_east_m * gone_east_m + gone_north_m * gone_north_m <= NEAR_M**2
-    return float(np.dot(one.weight, near))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from mapfilter.filters.contract import Reason
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
 from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.epochs import Epoch
@@ -44,22 +45,23 @@ def doubted(
         return [_motion(epoch, Reason.MOTION_STUCK)]
     if state.contested and beliefs.is_pulled(state):
         return positions_in_doubt(epoch, unused)
+    leading = _leading_elsewhere(state) if state.contested and not taken_over else None
+    if leading is not None and leading.is_look:
+        # Another place near by, by the same readings.
+        return []
     if moves and (taken_over or (epoch.motion and state.contested)):
-        stuck = not taken_over and _has_walked_uncounted(state)
+        # One that reads headings as the belief does is of a walk of which no step was counted.
+        stuck = leading is not None and leading.hold == state.hold
         return [_motion(epoch, Reason.MOTION_STUCK if stuck else Reason.PHONE_TURNED)]
     return [_motion(epoch, Reason.OTHER_UNIT)] if other_unit else []
 
 
-def _has_walked_uncounted(state: BayesState) -> bool:
-    """Return whether the likeliest rival elsewhere reads headings as the belief does.
-
-    It is one of a walk of which no step was counted, then.
-    """
+def _leading_elsewhere(state: BayesState) -> HeldOtherwise | None:
+    """Return the likeliest of the rivals that lie elsewhere, positions apart."""
     main = state.belief
     if not isinstance(main, ParticleBelief):
-        return False
-    leading = next((one for one in state.held if one.is_elsewhere(main)), None)
-    return leading is not None and leading.hold == state.hold
+        return None
+    return next((one for one in state.held if one.is_elsewhere(main)), None)
 
 
 def _motion(epoch: Epoch, why: Reason) -> UnusedReading:

@@ -172,6 +172,8 @@ class Weighing:
         shared = replace(evidence, terms=(*evidence.terms, *more)) if more else evidence
         after = self._rivals.turned(after, shared, epoch.time_s, measured=measured)
         after = self._rivals.unaided(after, updates, epoch.time_s, measured=measured)
+        if beliefs.asks_for_look(before, after, taken_over=now.taken_over):
+            after = self.new_beliefs.looking_around(after, epoch.time_s)
         if beliefs.asks_for_proof(after):
             after = self.new_beliefs.asked_for_proof(after, epoch)
         return after, Reason.USED

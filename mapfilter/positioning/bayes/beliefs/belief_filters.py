@@ -32,6 +32,8 @@ MapFilter = BeliefFilter[Start, Any, RadioReading]
 
 _MORE_PARTICLES, _MORE_SEARCHING = 6, 3
 """Factors of the numbers of particles where headings are unknown."""
+_AROUND = 6
+"""Factor of the number of particles of a rival where it looks for another place near by."""
 _FOLLOWED, _SOUGHT = (Status.TRACKING,), (Status.SEARCHING, Status.LOST, Status.OUTSIDE)
 _LED_LOG_ODDS, _PROVEN_LOG_ODDS = -3.0, -6.0
 """Log odds of a belief that is wrong to fixes that are, where these lie apart from those before: of
@@ -181,6 +183,18 @@ class BeliefFilters:
         return self._smaller(self.holds)
 
     @cached_property
+    def around(self) -> MapFilter:
+        """The filter of a belief about the place that a search has found."""
+        few = min(_AROUND * self.holds.particles, self.options.max_particles)
+        options = replace(
+            self.options,
+            max_particles=few,
+            min_particles=min(self.holds.particles, few),
+            min_search_particles=min(_AROUND // 2 * self.holds.particles, few),
+        )
+        return ParticleFilter(self.model, options, self.model.threads)
+
+    @cached_property
     def alone(self) -> MapFilter:
         """The filter of beliefs without positions that began as the belief: smaller ones, too."""
         return self._smaller(self.pulls)
@@ -246,6 +260,15 @@ class BeliefFilters:
         if state.proven or any(one.from_scratch for one in state.unaided):
             return False
         return self._is_led(state)
+
+    def asks_for_look(self, before: MapBelief, state: BayesState, *, taken_over: bool) -> bool:
+        """Return whether a belief has just found a place, by radio and a compass alone."""
+        main = state.belief
+        if not self.holds.watched or not state.compass or not isinstance(main, ParticleBelief):
+            return False
+        found = main.status in (Status.CONVERGED, Status.TRACKING)
+        anew = before.status is Status.SEARCHING or taken_over
+        return found and anew and not self.is_positioned(state)
 
     def used_positions(self, state: BayesState) -> bool:
         """Return whether a position or satellites have been used so far."""

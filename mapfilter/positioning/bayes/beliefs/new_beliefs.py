@@ -22,6 +22,7 @@ from mapfilter.positioning.bayes.rivals.alternative import (
 )
 from mapfilter.positioning.bayes.rivals.contradicted import hold_of_next
 from mapfilter.positioning.bayes.rivals.mirrored import MirroredTwin
+from mapfilter.positioning.bayes.rivals.nearby import looking_around
 from mapfilter.positioning.bayes.rivals.own_draws import Purpose, own_rng
 from mapfilter.positioning.bayes.rivals.step_units import (
     log_odds_of_unit,
@@ -85,6 +86,18 @@ class NewBeliefs:
         pulls, gone_m = self.beliefs.pulls, state.reckoning.travelled_m
         one = searching_alone(pulls, main, begun, state.hold, gone_m)
         return replace(state, unaided=(*state.unaided, one))
+
+    def looking_around(self, state: BayesState, time_s: float) -> BayesState:
+        """Start a belief about the place that a search has found."""
+        main, (west_m, south_m) = state.belief, self.beliefs.model.area.origin_m
+        assert isinstance(main, ParticleBelief), "only particles have rivals"
+        east_m, north_m = main.summary.mean[:2]
+        holds, gone_m = self.beliefs.holds, state.reckoning.travelled_m
+        place = west_m + east_m, south_m + north_m, holds.misplaced_sd_m
+        prior = Start(None, state.compass, *place)
+        begun = self.beliefs.around.init(prior, own_rng(time_s, Purpose.AROUND))
+        one = looking_around(holds, main, begun, state.hold, gone_m)
+        return replace(state, held=(*state.held, one))
 
     def twin(
         self,

@@ -37,6 +37,9 @@ SPEAKS_NATS = 0.3
 _BEND_M, _BEND_NATS = 200.0, -2.0
 """Distance after which one that nothing speaks for is given up, and log Bayes factor at which it is
 refuted: bends are many, and to either side of one beliefs come apart soon."""
+_LOOK_NATS, _LOOK_WINS_NATS = -25.0, 4.0
+"""Log Bayes factors at which one that looks for another place is refuted, and takes over: it has
+to learn anew what the main belief knows of levels and steps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +67,9 @@ class HeldOtherwise:
         the walker has turned round.
     at_bend : bool
         It began at a bend of the way, as one of a phone that was mirrored before.
+    near_at_start : float
+        Of one that looks for another place near by, its share within 50 m of the main belief at its
+        start; NaN of others.
     """
 
     belief: ParticleBelief
@@ -75,6 +81,12 @@ class HeldOtherwise:
     from_scratch: bool = False
     tells_half_turn: bool = False
     at_bend: bool = False
+    near_at_start: float = nan
+
+    @property
+    def is_look(self) -> bool:
+        """Whether it looks for another place near by."""
+        return isfinite(self.near_at_start)
 
     def log_bayes_factor(self, main: ParticleBelief) -> float:
         """Return the logarithm of the Bayes factor against the main belief."""
@@ -225,12 +237,14 @@ def still_open(
 
 def _refuted_at(rules: RivalRules, one: HeldOtherwise) -> float:
     """Return the log Bayes factor at which a belief is refuted."""
+    if one.is_look:
+        return _LOOK_NATS
     return max(rules.abandon_threshold, _BEND_NATS) if one.at_bend else rules.abandon_threshold
 
 
 def _undecided_m(rules: RivalRules, one: HeldOtherwise, main: ParticleBelief) -> float:
     """Return the distance for which a belief may stay undecided."""
-    if _leads(rules, one, main):
+    if _leads(rules, one, main) or (one.is_look and one.is_elsewhere(main)):
         return max(rules.abandon_after_m, rules.abandon_ahead_after_m)
     waits = not one.at_bend or one.log_bayes_factor(main) >= SPEAKS_NATS
     return rules.abandon_after_m if waits else min(rules.abandon_after_m, _BEND_M)
@@ -279,11 +293,17 @@ def winner(
     able = (
         one
         for one in held
-        if one.log_odds(main) >= rules.win_log_odds
+        if _wins(rules, one, main)
         and one.belief.status is Status.TRACKING
         and one.null.log_odds <= max_null_log_odds
     )
     return max(able, key=lambda one: one.log_odds(main), default=None)
+
+
+def _wins(rules: RivalRules, one: HeldOtherwise, main: ParticleBelief) -> bool:
+    if one.is_look:
+        return one.log_bayes_factor(main) >= _LOOK_WINS_NATS and one.is_elsewhere(main)
+    return one.log_odds(main) >= rules.win_log_odds
 
 
 def after_takeover(held: Sequence[HeldOtherwise], best: HeldOtherwise) -> tuple[HeldOtherwise, ...]:

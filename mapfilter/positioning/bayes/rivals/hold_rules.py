@@ -79,6 +79,12 @@ class HoldRules(RivalRules):
         not; for hypotheses of a search.
     mirrored_odds : float
         Odds of its being mirrored against its being turned.
+    misplaced_probability : float
+        That a search has converged to another place than the right one, which is near.
+    misplaced_sd_m : float
+        Deviation of the right place from that, to either side.
+    confirm_mass : float
+        Share of one that looks for it, within 50 m of the main belief, at which it has found none.
     """
 
     jump_deg: Positive = 60.0
@@ -89,6 +95,9 @@ class HoldRules(RivalRules):
     around_probability: Probability = 0.25
     back_odds: Positive = 4.0
     mirrored_odds: Positive = 0.25
+    misplaced_probability: Probability = 0.03
+    misplaced_sd_m: Positive = 100.0
+    confirm_mass: Probability = 0.98
 
     def is_around(self, changed_rad: float) -> bool:
         """Return whether a change of the heading is one right round."""

@@ -31,6 +31,8 @@ class Purpose(IntEnum):
     """The same as it moves."""
     ALONE = 8
     """A belief that begins from scratch, without positions."""
+    AROUND = 9
+    """One that begins about the place that a search has found."""
 
 
 def own_rng(time_s: float, purpose: Purpose) -> np.random.Generator:

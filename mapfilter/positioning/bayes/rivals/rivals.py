@@ -30,6 +30,7 @@ from mapfilter.positioning.bayes.rivals.held import (
     winner,
 )
 from mapfilter.positioning.bayes.rivals.hold_rules import PullRules
+from mapfilter.positioning.bayes.rivals.nearby import confirms
 from mapfilter.positioning.bayes.rivals.own_draws import Purpose, own_rng
 from mapfilter.positioning.bayes.sources.evidence import (
     EvidenceSource,
@@ -64,14 +65,17 @@ class Rivals:
         if not state.held or not isinstance(main, ParticleBelief):
             return state
         rules, holds = self.beliefs.rules_of(state), self.beliefs.holds
-        rng, filter_ = own_rng(time_s, Purpose.WEIGHED), self.beliefs.held_otherwise
+        rng = own_rng(time_s, Purpose.WEIGHED)
+        around, smaller = self.beliefs.around, self.beliefs.held_otherwise
         # Pseudoranges are compared with the main belief alone, whose total likelihood they leave.
         evidence = evidence.for_other_hypotheses()
         weighed = [
-            self._weighed(state, one, filter_, evidence, rng, measured=measured)
+            self._weighed(
+                state, one, around if one.is_look else smaller, evidence, rng, measured=measured
+            )
             for one in state.held
         ]
-        found = [one for one in weighed if one is not None]
+        found = [one for one in weighed if one is not None and not confirms(holds, one, main)]
         held = still_open(holds, found, main, state.reckoning.travelled_m)
         refuted = (one for one, now in zip(state.held, weighed, strict=True) if now is None)
         half_turns = state.half_turns.after(found, held, main).with_refuted(refuted)
