@@ -18,7 +18,7 @@ from mapfilter._json_files import check_version
 from mapfilter.errors import StoreError, fail
 from mapfilter.serving.state_values import ValueReader, ValueWriter
 
-FORMAT, VERSION = "mapfilter session", 22
+FORMAT, VERSION = "mapfilter session", 23
 
 _LARGEST_BYTES = 256 << 20
 _LARGEST_LINE = 1000

@@ -10,11 +10,12 @@ import pytest
 from mapfilter.filters.contract import Status
 from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.positioning.bayes.certainty import Recovery, _share_near, certainty
+from mapfilter.positioning.bayes.certainty import Recovery, certainty
 from mapfilter.positioning.bayes.claims import judged
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, AlternativeRules
 from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
 from mapfilter.positioning.bayes.rivals.hold import Hold
+from mapfilter.positioning.bayes.rivals.nearby import share_near
 from mapfilter.positioning.bayes.state import BayesState
 
 RULES = AlternativeRules()
@@ -137,7 +138,7 @@ def test_the_share_near_a_place_is_that_within_fifty_metres_to_all_sides():
     state[1] = [200 + north_m for _, north_m in away]
     weight = 2.0 ** -np.arange(1, 9)
     one = SimpleNamespace(state=state, weight=weight)
-    assert _share_near(one, main) == 1 / 2 + 1 / 4 + 1 / 8 + 1 / 16
+    assert share_near(one, main) == 1 / 2 + 1 / 4 + 1 / 8 + 1 / 16
 
 
 def test_masses_on_a_grid_are_not_compared_with_turned_phones():

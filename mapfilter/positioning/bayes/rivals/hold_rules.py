@@ -95,9 +95,9 @@ class HoldRules(RivalRules):
     around_probability: Probability = 0.25
     back_odds: Positive = 4.0
     mirrored_odds: Positive = 0.25
-    misplaced_probability: Probability = 0.03
+    misplaced_probability: Probability = 0.02
     misplaced_sd_m: Positive = 100.0
-    confirm_mass: Probability = 0.98
+    confirm_mass: Probability = 0.95
 
     def is_around(self, changed_rad: float) -> bool:
         """Return whether a change of the heading is one right round."""
