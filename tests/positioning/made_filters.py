@@ -89,6 +89,7 @@ class Beliefs:
     positions: bool = False
     positioned: bool = False
     asks: bool = False
+    looks: bool = False
 
     @property
     def model(self):
@@ -96,6 +97,10 @@ class Beliefs:
 
     @property
     def alone(self):
+        return self.held_otherwise
+
+    @property
+    def around(self):
         return self.held_otherwise
 
     def filter_of(self, state):
@@ -132,6 +137,9 @@ class Beliefs:
 
     def asks_for_proof(self, _):
         return self.asks
+
+    def asks_for_look(self, before, state, *, taken_over):
+        return self.looks
 
 
 @dataclass

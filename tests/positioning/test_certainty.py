@@ -72,7 +72,7 @@ def test_where_a_rival_lies_is_looked_at_only_where_it_may_matter(enough, looked
 
 def rival(log_odds, *places):
     """A belief in which the phone was turned, with these log odds to the bit."""
-    return SimpleNamespace(belief=belief(*places), log_odds=lambda _: log_odds)
+    return SimpleNamespace(belief=belief(*places), log_odds=lambda _: log_odds, is_look=False)
 
 
 def test_limits_that_are_met_exactly():

@@ -95,8 +95,9 @@ class NewBeliefs:
         holds, gone_m = self.beliefs.holds, state.reckoning.travelled_m
         place = west_m + east_m, south_m + north_m, holds.misplaced_sd_m
         prior = Start(None, state.compass, *place)
-        begun = self.beliefs.around.init(prior, own_rng(time_s, Purpose.AROUND))
-        one = looking_around(holds, main, begun, state.hold, gone_m)
+        rng = own_rng(time_s, Purpose.AROUND)
+        begun = self.beliefs.around.init(prior, rng)
+        one = looking_around(holds, main, begun, state.hold, gone_m, rng)
         return replace(state, held=(*state.held, one))
 
     def twin(

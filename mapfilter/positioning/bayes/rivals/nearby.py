@@ -18,6 +18,7 @@ import numpy as np
 
 from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleBelief
+from mapfilter.models.street_motion import BIAS
 from mapfilter.positioning.bayes.rivals.alternative import MapBelief
 from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
 from mapfilter.positioning.bayes.rivals.hold import Hold
@@ -27,9 +28,17 @@ _LEAST_SHARE = 1e-6
 
 
 def looking_around(
-    rules: HoldRules, main: ParticleBelief, begun: ParticleBelief, hold: Hold, travelled_m: float
+    rules: HoldRules,
+    main: ParticleBelief,
+    begun: ParticleBelief,
+    hold: Hold,
+    travelled_m: float,
+    rng: np.random.Generator,
 ) -> HeldOtherwise:
     """Return a belief that has begun about the place that a search has found, as its rival.
+
+    Half of its hypotheses have heading errors of the main belief, which may be those of a phone
+    that was turned during the search.
 
     Parameters
     ----------
@@ -39,9 +48,14 @@ def looking_around(
         How the main belief reads headings.
     travelled_m : float
         By dead reckoning.
+    rng : numpy.random.Generator
+        For the draws of this belief alone.
     """
-    near = share_near(begun, main)
-    begun = replace(begun, log_evidence=main.log_evidence)
+    near, state = share_near(begun, main), begun.state.copy()
+    share = np.exp(main.log_weight - main.log_weight.max())
+    as_main = rng.choice(share.size, state[BIAS, ::2].size, p=share / share.sum())
+    state[BIAS, ::2] = main.state[BIAS, as_main]
+    begun = replace(begun, state=state, log_evidence=main.log_evidence)
     log_prior = _log_odds(rules.misplaced_probability)
     return HeldOtherwise(begun, hold, log_prior, travelled_m, from_scratch=True, near_at_start=near)
 
