@@ -62,6 +62,7 @@ class Area:
     edge: bool = False
     inside: bool = True
     cell_ids: tuple = ("A",)
+    origin_m: tuple = (1000.0, 2000.0)
 
     def at_edge(self, place_m):
         return self.edge and place_m[0] == 500.0
@@ -138,7 +139,7 @@ class Beliefs:
     def asks_for_proof(self, _):
         return self.asks
 
-    def asks_for_look(self, before, state, *, taken_over):
+    def asks_for_look(self, *_, taken_over):  # noqa: ARG002
         return self.looks
 
 

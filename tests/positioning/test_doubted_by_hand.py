@@ -14,8 +14,8 @@ TURNED, EPOCH = Hold(1.0, 3.0), Epoch(1.0, (MotionStep(1.4, 0.3),))
 BELIEFS = SimpleNamespace(may_have_left=lambda _: False, is_pulled=lambda _: False)
 
 
-def rival(hold, *, elsewhere=True):
-    return SimpleNamespace(hold=hold, is_elsewhere=lambda _: elsewhere)
+def rival(hold, *, elsewhere=True, look=False):
+    return SimpleNamespace(hold=hold, is_elsewhere=lambda _: elsewhere, is_look=look)
 
 
 @pytest.mark.parametrize("main", [Hold(), Hold(-1.0, 0.5, 0.3)])
@@ -30,3 +30,12 @@ def test_the_likeliest_rival_tells_whether_the_counter_or_the_phone(main, uncoun
     state = SimpleNamespace(belief=belief(), hold=main, contested=True, held=held)
     (found,) = doubted(BELIEFS, state, main, EPOCH, [], moves=True)
     assert (found.kind, found.reason) == ("motion", why)
+
+
+@pytest.mark.parametrize("elsewhere", [True, False])
+def test_another_place_by_the_same_readings_puts_no_sensor_in_doubt(elsewhere):
+    """It is the likeliest, of those elsewhere or of all; then the phone of the next one counts."""
+    held = rival(Hold(), elsewhere=elsewhere, look=True), rival(TURNED)
+    state = SimpleNamespace(belief=belief(), hold=Hold(), contested=True, held=held)
+    found = doubted(BELIEFS, state, Hold(), EPOCH, [], moves=True)
+    assert [one.reason for one in found] == ([] if elsewhere else [Reason.PHONE_TURNED])

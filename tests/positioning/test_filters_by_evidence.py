@@ -5,8 +5,10 @@ from math import inf
 from types import SimpleNamespace
 
 import pytest
+from made_filters import belief
 
 from mapfilter._threads import ONE
+from mapfilter.filters.contract import Status
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
@@ -96,6 +98,42 @@ def test_beliefs_beside_the_main_one_are_smaller(most, few):
         found = one.options
         assert (found.max_particles, found.min_particles) == (2 * few, few)
         assert found.min_search_particles == few
+
+
+@pytest.mark.parametrize(("most", "search", "least"), [(9000, 2100, 700), (600, 600, 600)])
+def test_a_second_look_has_enough_hypotheses_for_what_is_near(most, search, least):
+    filters = replace(WITH_CELLS, options=numbers(most), holds=HoldRules(particles=700))
+    found = filters.around.options
+    assert found.max_particles == min(4200, most)
+    assert (found.min_search_particles, found.min_particles) == (search, least)
+
+
+SEARCHED, FOUND = belief(Status.SEARCHING), belief(Status.CONVERGED)
+
+
+@pytest.mark.parametrize(
+    ("changes", "before", "taken_over", "asks"),
+    [
+        ({}, SEARCHED, False, True),
+        ({"belief": belief(Status.TRACKING)}, SEARCHED, False, True),
+        ({"belief": SEARCHED}, SEARCHED, True, False),
+        ({}, FOUND, False, False),
+        ({}, FOUND, True, True),
+        ({"compass": False}, SEARCHED, False, False),
+        ({"belief": None}, SEARCHED, False, False),
+    ],
+)
+def test_who_has_just_found_a_place_looks_again(changes, before, taken_over, asks):
+    state = replace(state_of(), **{"belief": FOUND, **changes})
+    assert WITH_CELLS.asks_for_look(before, state, taken_over=taken_over) == asks
+    unwatched = replace(WITH_CELLS, holds=HoldRules(watched=False))
+    assert not unwatched.asks_for_look(before, state, taken_over=taken_over)
+
+
+@pytest.mark.parametrize(("used_at_m", "asks"), [(800.0, False), (799.0, True)])
+def test_positions_of_the_last_200_m_need_no_second_look(used_at_m, asks):
+    state = replace(state_of(used_at_m), belief=FOUND)
+    assert WITH_CELLS.asks_for_look(SEARCHED, state, taken_over=False) == asks
 
 
 def test_the_map_may_start_where_there_are_no_cells():

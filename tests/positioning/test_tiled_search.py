@@ -200,7 +200,7 @@ def test_a_walk_is_found_from_a_search_of_some_tiles(tmp_path):
     tiled = TiledArea.of_database(database, side=20, search_tiles=20)
     positioner = BayesFilter().over_area(tiled)
     for seed in (21, 22):
-        log = walk_log(town, seed, error_db=3.0)
+        log = walk_log(town, seed, 1500.0, error_db=3.0)
         rng, state = np.random.default_rng(5), positioner.begin()
         for epoch in epochs(log):
             state, output = positioner.step(state, epoch, rng)

@@ -68,6 +68,7 @@ def test_the_usual_rules_of_phones_that_are_turned_and_of_mirrored_paths():
         "lost_log_odds": -1.0, "lost_after_m": 7.0, "win_log_odds": 8.0,
         "abandon_threshold": -4.0, "abandon_after_m": 400.0, "abandon_ahead_after_m": 1200.0,
         "max_beliefs": 6, "particles": 1000,
+        "misplaced_probability": 0.02, "misplaced_sd_m": 100.0, "confirm_mass": 0.95,
     }  # fmt: skip
     assert asdict(MirrorRules()) == {
         "least_lead": 6.0, "lead_share": 0.4, "usual_nats_per_m": 0.03, "margin_nats": 4.0,
