@@ -169,7 +169,8 @@ class BayesPositioner(Filter[BayesState]):
     ) -> BayesState:
         """Return the state at a known start, in the CRS of the database.
 
-        It is tracked from there, unless ``sd_m`` is so large that it counts as several places.
+        It is tracked from there, unless ``sd_m`` is so large that it counts as several places, and
+        claimed if it is certain enough.
 
         Raises
         ------
@@ -186,7 +187,9 @@ class BayesPositioner(Filter[BayesState]):
         belief, known = replace(belief, status=status), status is Status.TRACKING
         begun = self.begin()
         watch = begun.watch._replace(undirected=UndirectedWay(since_m=0.0))
-        return replace(begun, belief=belief, status=status, proven=known, watch=watch)
+        begun = replace(begun, belief=belief, status=status, proven=known, watch=watch)
+        # Beliefs may wait from the first epoch on, and are not judged until one is weighed.
+        return judged(self.beliefs, begun, weighed=False, positioned=False)
 
     def step(
         self, state: BayesState, epoch: Epoch, rng: np.random.Generator
