@@ -267,6 +267,20 @@ def test_each_route_may_have_one_case_which_is_the_same_as_among_all(tmp_path):
     assert {**same, "seconds": 0} == {**rows[1], "seconds": 0}
     with pytest.raises(ConfigError, match="one_case"):
         run_foreign(config, "sensors", tmp_path / "one", resume=True, **given)
+    # Finished batches are those of one case a route, and are not done again.
+    done = []
+    again = {"one_case": True, "resume": True, "progress": lambda *count: done.append(count)}
+    resumed = run_foreign(config, "sensors", tmp_path / "one", **given, **again)
+    assert repr(resumed.cases) == repr(result.cases)
+    assert done == []
+
+
+def test_a_single_fault_has_no_row_of_all_faults_together(tmp_path):
+    config, fixed = load_foreign(None, UNDRAWN)
+    given = {"runs": 1, "seed": 3, "workers": 1, "fixed": fixed}
+    names = ("no-fault", "headings-mirrored")
+    result = run_foreign(config, "sensors", tmp_path, cases=names, **given)
+    assert [case.name for case in result.cases] == list(names)
 
 
 @pytest.mark.parametrize("one_case", [False, True])
