@@ -49,6 +49,13 @@ def judged(
     return state if recovery is state.recovery else changed(state, recovery=recovery)
 
 
+def tracked(state: BayesState) -> BayesState:
+    """Return a state as TRACKING where only its last report was in doubt, and not its belief."""
+    if not (state.contested or state.status is Status.UNCERTAIN):
+        return state
+    return changed(state, status=Status.TRACKING, contested=False)
+
+
 def _claim(
     beliefs: BeliefFilters,
     state: BayesState,
