@@ -18,7 +18,7 @@ from mapfilter.positioning.bayes.beliefs import belief_filters, first_hypotheses
 from mapfilter.positioning.bayes.rivals import (
     alternative,
     bends,
-    held,
+    compared,
     hold_rules,
     mirrored,
     step_units,
@@ -49,7 +49,8 @@ WORDS = {4: "four", 8: "eight", 10: "ten"}
 
 
 FILTER = (
-    f"a claim needs {share(BAYES.switch_mass)} of the belief in one place",
+    f"To converge it takes {share(BAYES.switch_mass)} of the belief in one place, and from then on "
+    f"a claim takes a probability of {share(BAYES.claim_mass)}",
     f"{share(MOTION.white_share)} are white",
     f"a correlation length of {number(MOTION.heading_m)} m",
     f"every {number(1 / MOTION.disturbances_per_m)} m on average at 15°",
@@ -134,8 +135,8 @@ FAULTS = (
     f"more than {number(HOLDS.bend_deg)}°, and less than {number(HOLDS.around_deg)}°, from the "
     f"direction of the last metres (a mean that falls off by 1/e in "
     f"{number(bends._MEMORY_M)} m, of {number(bends._LEAST_M)} m or more)",
-    f"after {number(held._BEND_M)} m, unless something speaks for it (a Bayes factor of "
-    f"{e_to(held.SPEAKS_NATS)} or more), and at one of {e_to(held._BEND_NATS)}.",
+    f"after {number(compared._BEND_M)} m, unless something speaks for it (a Bayes factor of "
+    f"{e_to(compared.SPEAKS_NATS)} or more), and at one of {e_to(compared._BEND_NATS)}.",
     f"odds that a jump is the phone's are {HOLDS.probability:g} to 1",
     f"turn it back with {WORDS[HOLDS.back_odds]} times these odds",
     f"From {e_to(HOLDS.lost_log_odds)} on (a probability of 0.27), with a position more than 50 m "

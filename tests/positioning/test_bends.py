@@ -10,8 +10,9 @@ from noting_filters import TRACKING, Beliefs, belief, move, walking
 from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.positioning.bayes.rivals.alternative import NullHypothesis
 from mapfilter.positioning.bayes.rivals.bends import Straight, mirrored_before, without_earlier
+from mapfilter.positioning.bayes.rivals.compared import after_takeover, still_open
 from mapfilter.positioning.bayes.rivals.half_turns import HalfTurns
-from mapfilter.positioning.bayes.rivals.held import HeldOtherwise, after_takeover, still_open
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
 from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
 from mapfilter.positioning.epochs import Pseudorange

@@ -95,7 +95,7 @@ def test_what_else_is_measured_decides_about_an_alternative_at_the_fixes(lead):
     rules, main = AlternativeRules(), belief(log_evidence=-10.0)
     other = rival(lead, gnss_log_bayes_factor=5.0)
     assert other.log_bayes_factor(main) == lead + 5.0
-    for by_fixes in (0.0, -3.0):
+    for by_fixes in (0.0, -3.0, -6.0):
         odds = max(exp(lead + by_fixes), exp(lead + 5.0 - 8.0))
         found = certainty(rules, main, other, by_fixes=by_fixes)
         assert found == pytest.approx(1 / (1 + odds))

@@ -13,8 +13,9 @@ from mapfilter.filters.contract import MotionStep, Reason
 from mapfilter.models.street_motion import BIAS, STATES, MotionErrors
 from mapfilter.positioning.bayes.beliefs.belief_changes import turned_at_jump
 from mapfilter.positioning.bayes.beliefs.moving import moved
+from mapfilter.positioning.bayes.rivals.compared import after_takeover
 from mapfilter.positioning.bayes.rivals.half_turns import HalfTurns
-from mapfilter.positioning.bayes.rivals.held import HeldOtherwise, after_takeover
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
 from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules, PullRules
 from mapfilter.positioning.bayes.state import BayesState

@@ -58,9 +58,9 @@ class State:
 
 def judged(
     state, *, weighed=True, positioned=False, contested=False, left=False, unheard=False,
-    by_fixes=-inf, left_share=0.0, used_positions=False,
+    by_fixes=-inf, left_share=0.0, used_positions=False, claimed_from=0.95,
 ):  # fmt: skip
-    rules = SimpleNamespace(claimed_from=0.95, lost_threshold=8.0, converge_log_odds=-12.0)
+    rules = SimpleNamespace(claimed_from=claimed_from, lost_threshold=8.0, converge_log_odds=-12.0)
     beliefs = SimpleNamespace(
         options=SimpleNamespace(split_mass=0.4),
         options_of=lambda _: SimpleNamespace(switch_mass=0.99, switch_hold_m=14.0),
@@ -161,6 +161,18 @@ def test_what_was_uncertain_is_claimed_when_it_has_been_certain_for_some_way():
         assert (anew.status, anew.recovery) == (Status.UNCERTAIN, Recovery(105.0, lost=False))
     # A loss meanwhile asks for more.
     assert judged(uncertain_before(105.0, 100.0), contested=True).recovery == Recovery()
+
+
+def test_what_agrees_as_it_would_to_converge_is_not_claimed_at_once_where_a_claim_asks_for_more():
+    """From the last doubt on it has to be certain for 5 m, as any other that was uncertain."""
+    agreed = judged(after_a_loss(114.0, 100.0), claimed_from=0.998)
+    assert (agreed.status, agreed.recovery) == (Status.UNCERTAIN, Recovery(114.0, lost=False))
+    for gone_m, claimed in ((114.0, False), (118.9, False), (119.0, True)):
+        later = replace(after_a_loss(gone_m, mass=1.0), recovery=agreed.recovery)
+        found = judged(later, claimed_from=0.998)
+        assert found.status is (Status.TRACKING if claimed else Status.UNCERTAIN)
+    positioned = judged(after_a_loss(114.0, 100.0), positioned=True, claimed_from=0.998)
+    assert (positioned.status, positioned.recovery) == (Status.UNCERTAIN, None)
 
 
 def test_a_measured_position_is_claimed_as_soon_as_it_is_certain():

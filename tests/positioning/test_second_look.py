@@ -16,7 +16,8 @@ from mapfilter.positioning.bayes.beliefs.new_beliefs import NewBeliefs
 from mapfilter.positioning.bayes.certainty import certainty
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeRules
-from mapfilter.positioning.bayes.rivals.held import HeldOtherwise, still_open, winner
+from mapfilter.positioning.bayes.rivals.compared import still_open, winner
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
 from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
 from mapfilter.positioning.bayes.rivals.nearby import (

@@ -13,16 +13,8 @@ from mapfilter.filters.hypotheses import Bins
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.models.street_motion import BIAS, STATES
 from mapfilter.positioning.bayes.rivals.alternative import NullHypothesis
-from mapfilter.positioning.bayes.rivals.held import (
-    HeldOtherwise,
-    after_takeover,
-    as_measured,
-    forked,
-    is_ahead,
-    jumps,
-    still_open,
-    winner,
-)
+from mapfilter.positioning.bayes.rivals.compared import after_takeover, is_ahead, still_open, winner
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise, as_measured, forked, jumps
 from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
 from mapfilter.positioning.bayes.rivals.own_draws import Purpose, own_rng

@@ -12,14 +12,8 @@ from mapfilter.angles import wrap_rad
 from mapfilter.filters.contract import MotionStep, Status
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.rivals.alternative import NullHypothesis
-from mapfilter.positioning.bayes.rivals.held import (
-    HeldOtherwise,
-    after_takeover,
-    is_ahead,
-    jumps,
-    still_open,
-    winner,
-)
+from mapfilter.positioning.bayes.rivals.compared import after_takeover, is_ahead, still_open, winner
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise, jumps
 from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
 

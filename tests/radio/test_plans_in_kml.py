@@ -1,6 +1,7 @@
 """Lists of cells as placemarks of KML and KMZ."""
 
 import io
+import struct
 import tracemalloc
 import zipfile
 
@@ -178,6 +179,21 @@ def test_a_damaged_document_is_told_as_such(tmp_path, method):
     whole = packed.getvalue()
     at = whole.index(b"doc.kml") + len("doc.kml")
     path.write_bytes(whole[:at] + bytes(20) + whole[at + 20 :])
+    with pytest.raises(InputError, match="a KMZ that can be read"):
+        read_cell_plan(path, CRS)
+
+
+def test_a_document_beyond_the_end_of_any_file_is_told_as_damage(written):
+    """Its place is in a field of 64 bits, and no file is as long: that ended in a traceback."""
+    path = written(mark(data(), POINT), packed=True)
+    whole = path.read_bytes()
+    begin, at = whole.index(b"PK\x01\x02"), whole.rindex(b"PK\x01\x02")
+    end = whole.rindex(b"PK\x05\x06")
+    extra = struct.pack("<HHQ", 1, 8, 2**63)
+    entry = bytearray(whole[at:end] + extra)
+    entry[30:32], entry[42:46] = struct.pack("<H", len(extra)), b"\xff" * 4
+    size = struct.pack("<I", end + len(extra) - begin)
+    path.write_bytes(whole[:at] + entry + whole[end : end + 12] + size + whole[end + 16 :])
     with pytest.raises(InputError, match="a KMZ that can be read"):
         read_cell_plan(path, CRS)
 

@@ -267,6 +267,35 @@ def test_each_route_may_have_one_case_which_is_the_same_as_among_all(tmp_path):
     assert {**same, "seconds": 0} == {**rows[1], "seconds": 0}
     with pytest.raises(ConfigError, match="one_case"):
         run_foreign(config, "sensors", tmp_path / "one", resume=True, **given)
+    # Finished batches are those of one case a route, and are not done again.
+    done = []
+    again = {"one_case": True, "resume": True, "progress": lambda *count: done.append(count)}
+    resumed = run_foreign(config, "sensors", tmp_path / "one", **given, **again)
+    assert repr(resumed.cases) == repr(result.cases)
+    assert done == []
+
+
+def test_a_single_fault_has_no_row_of_all_faults_together(tmp_path):
+    config, fixed = load_foreign(None, UNDRAWN)
+    given = {"runs": 1, "seed": 3, "workers": 1, "fixed": fixed}
+    names = ("no-fault", "headings-mirrored")
+    result = run_foreign(config, "sensors", tmp_path, cases=names, **given)
+    assert [case.name for case in result.cases] == list(names)
+
+
+@pytest.mark.parametrize("one_case", [False, True])
+def test_a_single_run_of_a_fault_goes_on_with_more(tmp_path, one_case):
+    """They are of further variants, whose databases the single one did not need."""
+    config, fixed = load_foreign(None, UNDRAWN)
+    given = {"seed": 3, "cases": ("cells-off",), "workers": 1, "fixed": fixed, "one_case": one_case}
+    run_foreign(config, "harsh", tmp_path, runs=1, **given)
+    (part,) = (tmp_path / "batches").glob("*.json")
+    first = json.loads(part.read_text())["rows"]
+    result = run_foreign(config, "harsh", tmp_path, runs=3, resume=True, **given)
+    assert [case.runs for case in result.cases] == [3]
+    again = json.loads(part.read_text())["rows"]
+    assert [row["route"] for row in again] == [0, 1]
+    assert {**again[0], "seconds": 0} == {**first[0], "seconds": 0}
 
 
 def test_cases_of_a_walk_share_it_and_faults_change_the_log_only(made):

@@ -61,7 +61,8 @@ class ForeignWorld:
     length_m : float or None
         Of the walks, in place of that of the cases.
     databases : tuple of str
-        Folders of the databases.
+        Folders of the databases by which worlds are told apart: that without faults, and the first
+        variant of each fault.
     """
 
     name: OtherWorld

@@ -85,7 +85,8 @@ def certainty(
         than how probable they are.
     by_fixes : float
         Log odds beforehand of an alternative at fixes that contradict the belief; -inf without such
-        fixes. They replace the threshold's, and the fixes' own part of its lead.
+        fixes. Where that makes it more probable, they replace the threshold's, and the fixes' own
+        part of its lead.
     """
     near, total = main.summary.mass_50m, 1.0
     if alternative is not None:

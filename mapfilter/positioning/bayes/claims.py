@@ -49,6 +49,13 @@ def judged(
     return state if recovery is state.recovery else changed(state, recovery=recovery)
 
 
+def tracked(state: BayesState) -> BayesState:
+    """Return a state as TRACKING where only its last report was in doubt, and not its belief."""
+    if not (state.contested or state.status is Status.UNCERTAIN):
+        return state
+    return changed(state, status=Status.TRACKING, contested=False)
+
+
 def _claim(
     beliefs: BeliefFilters,
     state: BayesState,
@@ -73,15 +80,16 @@ def _claim(
     known = state.alternative, state.rivals, agreed / here, by_fixes
     probability = here * certainty(rules, belief, *known)
     certain = probability >= rules.claimed_from and not _is_tested(beliefs, state, belief)
-    if recovery is None:
-        return certain, None if certain or not kept else Recovery(travelled_m, lost=False)
-    if not recovery.lost:
+    if recovery is not None and not recovery.lost:
         recovery = recovery.after(travelled_m, _AGAIN_M, agrees=certain)
-    elif weighed:
+    elif recovery is not None and weighed:
         # An alternative is in the probability, with its odds.
         agrees = probability >= options.switch_mass
         agrees = agrees and state.null.log_odds <= rules.converge_log_odds
         recovery = recovery.after(travelled_m, options.switch_hold_m, agrees=agrees)
+    if recovery is None and kept and not certain:
+        # That may be so though it agrees as a search does: a claim asks for more.
+        recovery = Recovery(travelled_m, lost=False)
     return certain and recovery is None, recovery
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import expm1
 from typing import Any
 
 import numpy as np
@@ -18,16 +17,15 @@ import numpy as np
 from mapfilter._changes import changed
 from mapfilter._device import PROCESSOR, Device
 from mapfilter.filters.contract import Reason, Status
-from mapfilter.filters.hypotheses import NEAR_M
 from mapfilter.filters.particle import ParticleOptions
 from mapfilter.positioning.bayes.area.area_frame import AreaFrame
+from mapfilter.positioning.bayes.beginning import begun_at
 from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
-from mapfilter.positioning.bayes.beliefs.first_hypotheses import Start
 from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.beliefs.moving import moved
 from mapfilter.positioning.bayes.beliefs.smoothing import BayesSmoother
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
-from mapfilter.positioning.bayes.claims import judged
+from mapfilter.positioning.bayes.claims import judged, tracked
 from mapfilter.positioning.bayes.doubted import doubted
 from mapfilter.positioning.bayes.maker import Maker
 from mapfilter.positioning.bayes.outputs import step_output
@@ -50,13 +48,10 @@ from mapfilter.positioning.gnss.options import GnssOptions, TimingOptions
 from mapfilter.positioning.gnss.source import FirstFix, FixSource, GnssSource, gnss_of
 from mapfilter.positioning.known_start import check_start
 from mapfilter.positioning.sensors.pace import DRIVEN, Pace
-from mapfilter.positioning.sensors.undirected import UndirectedWay
 from mapfilter.positioning.sensors.watch import SensorWatch
 from mapfilter.positioning.step_arguments import check_generator, check_kinds_given, check_later
 from mapfilter.positioning.step_output import StepOutput, UnusedReading
 
-_LEAST_AT_START = 0.8
-"""Share of a known start within 50 m from which on it is one place, and tracked."""
 _POSITIONS = frozenset[Kind]({"gnss", "pseudorange"})
 _TOLD_ELSEWHERE = (Reason.USED, Reason.NOT_MOVED_ENOUGH, Reason.NO_READING, Reason.STALE_RADIO)
 
@@ -169,7 +164,8 @@ class BayesPositioner(Filter[BayesState]):
     ) -> BayesState:
         """Return the state at a known start, in the CRS of the database.
 
-        It is tracked from there, unless ``sd_m`` is so large that it counts as several places.
+        It is tracked from there, unless ``sd_m`` is so large that it counts as several places, and
+        claimed if it is certain enough.
 
         Raises
         ------
@@ -179,14 +175,7 @@ class BayesPositioner(Filter[BayesState]):
         """
         check_start(east_m, north_m, sd_m, self.area.lattice)
         check_generator(rng)
-        belief = self.beliefs.by_compass[True].init(Start(None, True, east_m, north_m, sd_m), rng)
-        near = -expm1(-0.5 * (NEAR_M / sd_m) ** 2) if sd_m > 0 else 1.0
-        least = max(self.options.split_mass, _LEAST_AT_START)
-        status = Status.TRACKING if near > least else Status.SEARCHING
-        belief, known = replace(belief, status=status), status is Status.TRACKING
-        begun = self.begin()
-        watch = begun.watch._replace(undirected=UndirectedWay(since_m=0.0))
-        return replace(begun, belief=belief, status=status, proven=known, watch=watch)
+        return begun_at(self.beliefs, self.begin(), (east_m, north_m, sd_m), rng)
 
     def step(
         self, state: BayesState, epoch: Epoch, rng: np.random.Generator
@@ -203,7 +192,7 @@ class BayesPositioner(Filter[BayesState]):
         check_state(state, self.area)
         check_later(epoch, state.watch.times.epoch_s)
         check_generator(rng)
-        given, state = state, _tracked(state)
+        given, state = state, tracked(state)
         before, weighing = state.status, self._weighing
         usable = usable_epoch(state, epoch, by_ways=self.beliefs.by_ways)
         epoch, motion, radio = usable.epoch, usable.motion, usable.radio
@@ -271,7 +260,7 @@ class BayesPositioner(Filter[BayesState]):
         The state moved to the epoch, the evidence, and whether motion was measured; with the
         generator as before the step these are its own.
         """
-        spacing_m, given, state = state.particle_spacing_m, state, _tracked(state)
+        spacing_m, given, state = state.particle_spacing_m, state, tracked(state)
         usable = usable_epoch(state, epoch, by_ways=self.beliefs.by_ways)
         wait = self._waits(given, usable)
         state, _ = moved(self.beliefs, state, usable.watch, usable.epoch, rng, wait)
@@ -310,10 +299,3 @@ class BayesPositioner(Filter[BayesState]):
             belief.state[1].astype(np.float64) + south,
             belief.weight.astype(np.float64),
         )
-
-
-def _tracked(state: BayesState) -> BayesState:
-    """Return a state as TRACKING where only its last report was in doubt, and not its belief."""
-    if not (state.contested or state.status is Status.UNCERTAIN):
-        return state
-    return changed(state, status=Status.TRACKING, contested=False)

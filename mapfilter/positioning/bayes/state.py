@@ -75,7 +75,8 @@ class BayesState:
     last_fix : GnssFix or None
         The last one that was used.
     recovery : Recovery or None
-        Of a position that was lost though its belief did not search again, until it is claimed.
+        Of a position that was lost though its belief did not search again, or was uncertain, until
+        it is claimed.
     twin : MirroredTwin or None
         The mirrored motion, while a belief by the map alone has to prove itself.
     hold : Hold

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -18,7 +16,6 @@ from mapfilter._kernels import draw_key
 from mapfilter._threads import ONE, Threads
 from mapfilter._types import Floats32
 from mapfilter.config.load import load_config
-from mapfilter.database.estimate import peak_memory_bytes
 from mapfilter.database.store import open_database
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.copies import Copies, copies_of
@@ -37,12 +34,12 @@ from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.filter import BayesPositioner
 from mapfilter.positioning.bayes.options import BayesFilter
 from mapfilter.positioning.bayes.sources.evidence import RadioReading
-from mapfilter.positioning.loop import locate
 from mapfilter.positioning.merging import epochs
 from mapfilter.tracks.log import TrackLog
 from mapfilter.tracks.log_folders import list_logs
 from mapfilter.tracks.store import read_log
 from mapfilter.workflows.bench import median_seconds
+from mapfilter.workflows.benchmarks.locating_memory import locating_memory_bytes
 from mapfilter.workflows.build import run_build
 from mapfilter.workflows.predict import run_predict
 from mapfilter.workflows.simulate import run_simulate
@@ -281,24 +278,3 @@ def _without_middle(log: TrackLog) -> TrackLog:
         motion=log.motion[~off].reset_index(drop=True),
         radio=log.radio[~received].reset_index(drop=True),
     )
-
-
-def locating_memory_bytes(database: Path, log: Path, *, smooth: bool) -> tuple[int, int]:
-    """Return the peak memory of a process: with its libraries loaded, and after locating a walk."""
-    code = (
-        "import sys; from pathlib import Path;"
-        "from mapfilter.workflows.benchmarks.filter import locate_once;"
-        "print(*locate_once(Path(sys.argv[1]), Path(sys.argv[2]), smooth=sys.argv[3] == 'smooth'))"
-    )
-    given = [sys.executable, "-c", code, str(database), str(log), "smooth" if smooth else "forward"]
-    done = subprocess.run(given, check=True, capture_output=True, text=True)
-    loaded, at_the_end = map(int, done.stdout.split())
-    return loaded, at_the_end
-
-
-def locate_once(database: Path, log: Path, *, smooth: bool) -> tuple[int, int]:
-    """Open, locate, and return this process's peak memory (bytes) before and after."""
-    loaded = peak_memory_bytes()
-    positioner = BayesFilter(smooth=smooth).over(open_database(database))
-    locate(read_log(log), positioner, np.random.default_rng(0))
-    return loaded, peak_memory_bytes()

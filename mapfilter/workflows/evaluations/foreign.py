@@ -179,8 +179,10 @@ def prepare(
     for fault in faults:
         for variant in range(min(VARIANTS, runs) if fault is not None else 0):
             given = given_inputs(fault, world.plan, world.lattice, seed, variant)
-            databases.append(database_name(fault, variant))
-            _database(world, given, folder / databases[-1], seed, variant)
+            _database(world, given, folder / database_name(fault, variant), seed, variant)
+        if fault is not None:
+            # Of few runs some variants are not built; the first one tells what all are made of.
+            databases.append(database_name(fault, 0))
     offsets_db = _drive_test(world, StreetLines(network), seed)
     made = ForeignWorld(name, folder, seed, offsets_db=offsets_db, databases=tuple(databases))
     return made, points

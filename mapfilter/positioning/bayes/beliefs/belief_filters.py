@@ -6,34 +6,31 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, isfinite
-from typing import Any
 
 import numpy as np
 
-from mapfilter._device import PROCESSOR, Device, arrays_of
-from mapfilter._threads import ONE
-from mapfilter.filters.contract import BeliefFilter, Status
-from mapfilter.filters.grid import GridBelief, GridFilter
-from mapfilter.filters.particle import ParticleBelief, ParticleFilter, ParticleOptions
-from mapfilter.positioning.bayes.beliefs.first_hypotheses import Start, any_heading
+from mapfilter._device import PROCESSOR, Device
+from mapfilter.filters.contract import Status
+from mapfilter.filters.particle import ParticleBelief, ParticleOptions
+from mapfilter.positioning.bayes.beliefs.made_filters import (
+    MapFilter,
+    around_filter,
+    grid_filters,
+    over_headings,
+    particle_filters,
+    smaller_filter,
+)
 from mapfilter.positioning.bayes.beliefs.model import BayesModel
 from mapfilter.positioning.bayes.carriageways import CarriagewayFilters
-from mapfilter.positioning.bayes.grid import StreetGrid
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeRules, MapBelief
-from mapfilter.positioning.bayes.rivals.held import HeldOtherwise, is_ahead
+from mapfilter.positioning.bayes.rivals.compared import is_ahead
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules, PullRules, RivalRules
 from mapfilter.positioning.bayes.rivals.rides import rides_unheard, rode
-from mapfilter.positioning.bayes.sources.evidence import RadioReading
 from mapfilter.positioning.bayes.state import BayesState
 from mapfilter.positioning.gnss.source import GnssSource, gnss_of
 from mapfilter.positioning.sensors.watch import SensorWatch
 
-MapFilter = BeliefFilter[Start, Any, RadioReading]
-
-_MORE_PARTICLES, _MORE_SEARCHING = 6, 3
-"""Factors of the numbers of particles where headings are unknown."""
-_AROUND = 6
-"""Factor of the number of particles of a rival where it looks for another place near by."""
 _FOLLOWED, _SOUGHT = (Status.TRACKING,), (Status.SEARCHING, Status.LOST, Status.OUTSIDE)
 _LED_LOG_ODDS, _PROVEN_LOG_ODDS = -3.0, -6.0
 """Log odds of a belief that is wrong to fixes that are, where these lie apart from those before: of
@@ -161,64 +158,34 @@ class BeliefFilters:
     def by_compass(self) -> dict[bool, MapFilter]:
         """The filters of a single belief, for headings with and without a compass."""
         if self.grid:
-            return {
-                compass: GridFilter(self._street_grid(compass=compass), self.options, self.device)
-                for compass in (True, False)
-            }
-        return self._particle_filters(self.options)
-
-    def _street_grid(self, *, compass: bool) -> StreetGrid:
-        model = replace(self.model, remember=False, threads=ONE)
-        return StreetGrid(model, compass, device=self.device)
+            return grid_filters(self.model, self.options, self.device)
+        return particle_filters(self.model, self.options)
 
     @cached_property
     def _by_carriageways(self) -> MapFilter:
         assert self.carriageways is not None
-        lanes = replace(self, model=self.carriageways.model)
-        return lanes._particle_filters(self.carriageways.options)[False]
+        lanes = self.carriageways
+        return particle_filters(lanes.model, lanes.options)[False]
 
     @cached_property
     def held_otherwise(self) -> MapFilter:
         """The filter of beliefs in which the phone was turned: smaller ones."""
-        return self._smaller(self.holds)
+        return smaller_filter(self.model, self.options, self.holds)
 
     @cached_property
     def around(self) -> MapFilter:
         """The filter of a belief about the place that a search has found."""
-        few = min(_AROUND * self.holds.particles, self.options.max_particles)
-        options = replace(
-            self.options,
-            max_particles=few,
-            min_particles=min(self.holds.particles, few),
-            min_search_particles=min(_AROUND // 2 * self.holds.particles, few),
-        )
-        return ParticleFilter(self.model, options, self.model.threads)
+        return around_filter(self.model, self.options, self.holds)
 
     @cached_property
     def alone(self) -> MapFilter:
         """The filter of beliefs without positions that began as the belief: smaller ones, too."""
-        return self._smaller(self.pulls)
-
-    def _smaller(self, rules: RivalRules) -> MapFilter:
-        few = min(rules.particles, self.options.max_particles)
-        options = replace(
-            self.options, max_particles=2 * few, min_particles=few, min_search_particles=few
-        )
-        return ParticleFilter(self.model, options, self.model.threads)
+        return smaller_filter(self.model, self.options, self.pulls)
 
     @cached_property
     def _positioned_by_compass(self) -> dict[bool, MapFilter]:
-        return self._particle_filters(self.positioned[0] if self.positioned else self.options)
-
-    def _particle_filters(self, known: ParticleOptions) -> dict[bool, MapFilter]:
-        # Every place times every heading: most of them die out after a few steps.
-        most = _MORE_PARTICLES * known.max_particles
-        searching = _MORE_SEARCHING * known.min_search_particles
-        unknown = replace(known, max_particles=most, min_search_particles=searching)
-        return {
-            True: ParticleFilter(self.model, known, self.model.threads),
-            False: ParticleFilter(self.model, unknown, self.model.threads),
-        }
+        known = self.positioned[0] if self.positioned else self.options
+        return particle_filters(self.model, known)
 
     def is_contested(self, state: BayesState) -> bool:
         """Return whether a rival is ahead: a turned phone, or a belief without positions."""
@@ -320,15 +287,4 @@ class BeliefFilters:
 
     def without_compass(self, belief: MapBelief, rng: np.random.Generator) -> MapBelief:
         """Spread a belief over all headings."""
-        if isinstance(belief, GridBelief):
-            grid = self._street_grid(compass=False)
-            count = grid.bias_rad.size
-            on, off = (
-                arrays_of(mass).repeat(mass.sum(axis=0, keepdims=True) / count, count, axis=0)
-                for mass in (belief.on, belief.off)
-            )
-            return replace(belief, on=on, off=off, model=grid)
-        state = any_heading(self.model, belief.state, _MORE_PARTICLES, rng)
-        log_weight = np.tile(belief.log_weight, _MORE_PARTICLES) - np.log(_MORE_PARTICLES)
-        kept = np.tile(belief.kept, (1, _MORE_PARTICLES))
-        return replace(belief, state=state, log_weight=log_weight, kept=kept)
+        return over_headings(self.model, belief, self.device, rng)

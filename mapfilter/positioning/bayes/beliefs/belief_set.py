@@ -18,8 +18,9 @@ from mapfilter.positioning.bayes.beliefs.belief_changes import (
 from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
 from mapfilter.positioning.bayes.rivals.alternative import AlternativeHypothesis, MapBelief
 from mapfilter.positioning.bayes.rivals.bends import mirrored_before, without_earlier
+from mapfilter.positioning.bayes.rivals.compared import still_open
 from mapfilter.positioning.bayes.rivals.half_turns import HalfTurns
-from mapfilter.positioning.bayes.rivals.held import HeldOtherwise, forked, still_open
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise, forked
 from mapfilter.positioning.bayes.rivals.mirrored import MirroredTwin, mirrored_step
 from mapfilter.positioning.bayes.rivals.own_draws import OwnDraws
 from mapfilter.positioning.bayes.state import BayesState

@@ -19,7 +19,8 @@ from mapfilter.angles import wrap_one_rad
 from mapfilter.filters.contract import MotionStep
 from mapfilter.filters.particle import ParticleBelief
 from mapfilter.positioning.bayes.rivals.alternative import NullHypothesis
-from mapfilter.positioning.bayes.rivals.held import SPEAKS_NATS, HeldOtherwise, smaller
+from mapfilter.positioning.bayes.rivals.compared import SPEAKS_NATS
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise, smaller
 from mapfilter.positioning.bayes.rivals.hold import Hold
 from mapfilter.positioning.bayes.rivals.hold_rules import HoldRules
 

@@ -15,20 +15,16 @@ import numpy as np
 from mapfilter._changes import changed
 from mapfilter.filters.contract import Reason, Status
 from mapfilter.filters.particle import ParticleBelief
-from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters, MapFilter
+from mapfilter.positioning.bayes.beliefs.belief_filters import BeliefFilters
+from mapfilter.positioning.bayes.beliefs.made_filters import MapFilter
 from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.rivals.alternative import (
     AlternativeRules,
     MapBelief,
     NullHypothesis,
 )
-from mapfilter.positioning.bayes.rivals.held import (
-    HeldOtherwise,
-    after_takeover,
-    is_ahead,
-    still_open,
-    winner,
-)
+from mapfilter.positioning.bayes.rivals.compared import after_takeover, is_ahead, still_open, winner
+from mapfilter.positioning.bayes.rivals.held import HeldOtherwise
 from mapfilter.positioning.bayes.rivals.hold_rules import PullRules
 from mapfilter.positioning.bayes.rivals.nearby import confirms
 from mapfilter.positioning.bayes.rivals.own_draws import Purpose, own_rng

@@ -19,13 +19,13 @@ won              found      other, TRACKING   TRACKING   other's  took over
 
 Then, by the status reported before: ``LOST`` stays while the belief searches and becomes
 ``TRACKING`` when it converges; ``CONVERGED`` lasts for one epoch. A belief that had converged and
-has less than half of it in one place is ``LOST`` and searches again; one that has less than 95 %
-there, rivals included, is ``UNCERTAIN``, and so is one that was ``LOST`` without a new search,
-until it has agreed for some way. While the null hypothesis is more probable than the belief, one
-that had converged is ``LOST``, too, and ``OUTSIDE`` where it lies at the edge of the area; one that
-searches is ``OUTSIDE``, and so is one that has left the area. A belief does not converge while the
-null hypothesis is not improbable or the alternative close behind, as the true position may have
-died out of it.
+has less than half of it in one place is ``LOST`` and searches again; one that is there with less
+than the probability of a claim, rivals included, is ``UNCERTAIN``, and so is one that was, or was
+``LOST`` without a new search, until it has agreed for some way. While the null hypothesis is more
+probable than the belief, one that had converged is ``LOST``, too, and ``OUTSIDE`` where it lies at
+the edge of the area; one that searches is ``OUTSIDE``, and so is one that has left the area. A
+belief does not converge while the null hypothesis is not improbable or the alternative close
+behind, as the true position may have died out of it.
 """
 
 from __future__ import annotations
