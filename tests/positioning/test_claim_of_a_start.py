@@ -7,6 +7,7 @@ import pytest
 from made_town import Town
 
 from mapfilter.filters.contract import MotionStep, Status
+from mapfilter.positioning.bayes.certainty import Recovery
 from mapfilter.positioning.bayes.options import BayesFilter, GridFilter
 from mapfilter.positioning.epochs import Epoch, GnssFix
 
@@ -41,6 +42,12 @@ def test_how_certain_it_has_to_be_is_an_option():
     assert state.status is Status.TRACKING
     state = positioner().begin_at(EAST_M, NORTH_M, 100.0, rng)
     assert (state.status, state.recovery) == (Status.SEARCHING, None)
+
+
+def test_a_wide_start_has_to_be_certain_for_some_way():
+    """As any position that was not: who stands there is not claimed by what levels tell alone."""
+    state = positioner().begin_at(EAST_M, NORTH_M, 25.0, np.random.default_rng(1))
+    assert state.recovery == Recovery(0.0, lost=False)
 
 
 def test_a_fix_at_a_wide_start_is_claimed_at_once():

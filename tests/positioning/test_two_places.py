@@ -87,5 +87,8 @@ def test_what_was_uncertain_is_not_held_to_the_rules_of_a_new_search(positioner)
 
 def test_a_wide_known_start_counts_as_several_places(positioner):
     rng = np.random.default_rng(3)
-    assert positioner.begin_at(500_100.0, 4_500_100.0, 27.0, rng).status is TRACKING
-    assert positioner.begin_at(500_100.0, 4_500_100.0, 29.0, rng).status is SEARCHING
+    state = positioner.begin_at(500_100.0, 4_500_100.0, 27.0, rng)
+    # One place, which is followed, but not certain enough to be claimed.
+    assert (state.belief.status, state.status) == (TRACKING, UNCERTAIN)
+    state = positioner.begin_at(500_100.0, 4_500_100.0, 29.0, rng)
+    assert (state.belief.status, state.status) == (SEARCHING, SEARCHING)

@@ -51,6 +51,16 @@ def test_each_case_has_its_diagram_and_its_worst_run(usual):
     assert drawn(out) == each | {"coverage.png"}
 
 
+def test_a_case_that_no_route_has_drawn_has_neither_row_nor_picture(tmp_path):
+    """Of one route with one case each there is one, with the worst run that is its only one."""
+    config, fixed = load_foreign(None, SMALL)
+    given = {"runs": 1, "seed": 1, "workers": 1, "fixed": fixed, "one_case": True}
+    (case,) = run_foreign(config, "foreign", tmp_path, cases=CASES, **given).cases
+    assert case.runs == 1
+    of_it = {f"{case.name}-{kind}.png" for kind in ("stanford", "worst")}
+    assert drawn(tmp_path) == of_it | {"coverage.png"}
+
+
 def test_the_table_has_the_counts_and_all_intervals(usual):
     out, result = usual
     rows = json.loads((out / "table.json").read_text())["cases"]
