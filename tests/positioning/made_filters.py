@@ -85,6 +85,7 @@ class Beliefs:
     unit_m: float = 1.0
     lanes: object = None
     held_otherwise: object = field(default_factory=lambda: gaining(-2.0))
+    around: object = field(default_factory=lambda: gaining(-2.0))
     holds: HoldRules = field(default_factory=HoldRules)
     pulls: PullRules = field(default_factory=PullRules)
     positions: bool = False
@@ -98,10 +99,6 @@ class Beliefs:
 
     @property
     def alone(self):
-        return self.held_otherwise
-
-    @property
-    def around(self):
         return self.held_otherwise
 
     def filter_of(self, state):

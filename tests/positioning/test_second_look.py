@@ -136,7 +136,7 @@ def test_a_belief_that_has_just_converged_has_one_beside_it():
     around, priors = gaining(-2.0), []
     around.init = lambda prior, _: (priors.append(prior), some(480, 520, 700, 900))[1]
     state = replace(STATE, belief=some(500, 500, status=TRACKING))
-    state, _ = weighed(Beliefs(looks=True, held_otherwise=around), state)
+    state, _ = weighed(Beliefs(looks=True, around=around), state)
     (one,) = state.held
     assert (one.is_look, one.start_m, one.near_at_start) == (True, 40.0, 0.5)
     # About the place of the belief, in the CRS of the area, without any reading.
@@ -144,6 +144,19 @@ def test_a_belief_that_has_just_converged_has_one_beside_it():
     assert (prior.reading, prior.east_m, prior.north_m) == (None, 1500.0, 2400.0)
     assert (prior.sd_m, prior.compass) == (RULES.misplaced_sd_m, True)
     assert not weighed(Beliefs(), STATE)[0].held
+
+
+@pytest.mark.parametrize(("east_m", "stays"), [(800.0, True), (520.0, False)])
+def test_it_is_weighed_by_a_filter_of_its_own_until_it_confirms_the_belief(east_m, stays):
+    beliefs = Beliefs(around=gaining(-3.0), held_otherwise=gaining(-1.0))
+    own = replace(belief(Status.SEARCHING, -11.0, east_m=east_m), travelled_m=0.0)
+    one = HeldOtherwise(own, Hold(), -3.9, 20.0, from_scratch=True, near_at_start=0.2)
+    found, _ = weighed(beliefs, replace(STATE, held=(one,)))
+    assert [left.belief.log_evidence for left in found.held] == ([-14.0] if stays else [])
+    assert len(beliefs.around.readings) == 1
+    assert not beliefs.held_otherwise.readings
+    # It may not converge before its own null hypothesis is refuted.
+    assert beliefs.around.readings[0].doubted
 
 
 TOWN = Town.of(2)
