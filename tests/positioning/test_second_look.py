@@ -6,7 +6,7 @@ from math import exp, log
 
 import numpy as np
 import pytest
-from made_filters import STATE, TRACKING, Beliefs, belief, gaining, weighed
+from made_filters import STATE, TRACKING, Beliefs, belief, gaining, rival, weighed
 from made_town import SOUTH_M, WEST_M, Town, walk_log
 from true_places import error_m
 
@@ -157,6 +157,16 @@ def test_it_is_weighed_by_a_filter_of_its_own_until_it_confirms_the_belief(east_
     assert not beliefs.held_otherwise.readings
     # It may not converge before its own null hypothesis is refuted.
     assert beliefs.around.readings[0].doubted
+
+
+@pytest.mark.parametrize("wins", [True, False])
+def test_an_alternative_that_takes_over_asks_for_one(wins):
+    beliefs, asked = Beliefs(filter=gaining(-2.0, status=TRACKING)), []
+    beliefs.asks_for_look = lambda before, _, *, taken_over: asked.append((before, taken_over))
+    given = replace(STATE, alternative=rival(9.0 if wins else -9.0, status=TRACKING))
+    found, _ = weighed(beliefs, given)
+    assert found.takeovers == wins
+    assert asked == [(STATE.belief, wins)]
 
 
 TOWN = Town.of(2)
